@@ -1,0 +1,45 @@
+"""The two kinds of error that a person caused and can mend; everything else is a defect of ours."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """Bad input, told in one line: where, which field, what was found, what was expected.
+
+    Parameters
+    ----------
+    where : str
+        File, topic, command-line option or message that holds the input.
+    field : str
+        Field inside it (dotted path, channel, column); empty when the whole of it is meant.
+    value : object
+        What was found, shown shortened.
+    expected : str
+        What would have been accepted.
+    """
+
+    def __init__(self, where: str, field: str, value: object, expected: str) -> None:
+        self.where = str(where)
+        self.field = field
+        self.value = value
+        self.expected = expected
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        place = f"{self.where}: {self.field}" if self.field else self.where
+        return f"{place}: got {_short(self.value)}, expected {self.expected}"
+
+
+class EnvironmentLackError(RuntimeError):
+    """The environment lacks something; `remedy` is the command that mends it (exit code 3)."""
+
+    def __init__(self, lack: str, remedy: str) -> None:
+        self.lack = lack
+        self.remedy = remedy
+        super().__init__(f"{lack}; mend it with: {remedy}")
+
+
+def _short(value: object, limit: int = 120) -> str:
+    text = value if isinstance(value, str) else repr(value)
+    text = " ".join(text.split())
+    return text if len(text) <= limit else text[: limit - 3] + "..."
