@@ -1,4 +1,4 @@
-"""Physical numbers in YAML: `{value: 0.8, unit: mm, source: "thesis 5.3.2"}` or `"0.8 mm"`, read into SI floats.
+"""Physical numbers in YAML, `{value: 0.8, unit: mm, source: "thesis 5.3.2"}` or `"0.8 mm"`, as SI floats.
 
 A pydantic model declares a field as `Annotated[float, Si("m", gt=0)]`. Units are converted by pint;
 a unit of the wrong dimension is an error. Machine descriptions must name the source of each number,
