@@ -72,9 +72,9 @@ class WindowInput:
 class BandSpectrum:
     """The squared envelope spectrum of one band over one window, in orders of the reference shaft.
 
-    `power` is float64 of shape (lines,): mean square per line of the squared envelope divided by its own mean,
-    so it has no unit; line k is at k * `order_step`. `variance_share` is the part of the band's squared mean
-    in the whole signal's mean square (how much energy the band holds).
+    `power` is float64 of shape (lines,): mean square per line of the squared envelope divided by its own
+    mean, so it has no unit; line k is at k * `order_step`. `variance_share` is the part of the whole
+    signal's mean square that the band holds.
     """
 
     band: Band
