@@ -1,0 +1,1 @@
+"""Diagnostic nodes: they translate between topics and the monitors, nothing more."""
