@@ -1,16 +1,236 @@
-"""Parameters of the parallel-shaft gearbox, read from the machine's YAML."""
+"""Parameters of the parallel-shaft gearbox, read from the `model` section of its machine YAML.
+
+Attributes are in SI units, named by their suffix; the keys in YAML are the names without the suffix,
+and each value there carries its unit and source. Teeth and bearing geometry come from the nameplate,
+so that they have one home.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
-from gearsim_io.quantities import Strict
+from gearsim_io.errors import InputError
+from gearsim_io.machines import load_machine, read_machine_file
+from gearsim_io.nameplate import Bearing, GearMesh, Machine
+from gearsim_io.quantities import Si, validate
+from pydantic import Field
+
+from gearsim_sim.params.fields import Count, Fraction, Strict
+
+BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
+MODEL_KIND = "parallel_shaft"
+
+
+class TorsionalEnd(Strict):
+    """A flywheel or an encoder at the end of a shaft, behind a torsion spring and damper."""
+
+    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
+    stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="stiffness")]
+    damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="damping")]
+
+
+class Gear(Strict):
+    """A gear wheel, lumped."""
+
+    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
+    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
+    base_radius_m: Annotated[float, Si("m", gt=0), Field(alias="base_radius")]
+
+
+class Seat(Strict):
+    """The part of a shaft lumped at a bearing, and the damper of that bearing."""
+
+    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
+    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
+    damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
+
+
+class Shafts(Strict):
+    """Stiffness of each shaft half, from gear to bearing."""
+
+    torsional_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="torsional_stiffness")]
+    bending_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="bending_stiffness")]
+
+
+class MeshStiffness(Strict):
+    """Stiffness and damping of the tooth contact along the line of action."""
+
+    mean_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="mean_stiffness")]
+    damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
+    contact_ratio: Annotated[float, Si("", gt=1, lt=2)]
+    pair_stiffness_ratio: Annotated[float, Si("", ge=1, le=2)]
+    harmonics: Count
+
+
+class GearErrors(Strict):
+    """Transmission error of each gear, added along the line of action."""
+
+    runout_m: Annotated[float, Si("m", ge=0), Field(alias="runout")]
+    profile_m: Annotated[float, Si("m", ge=0), Field(alias="profile")]
+    pinion_phase_rad: Annotated[float, Si("rad"), Field(alias="pinion_phase")]
+    gear_phase_rad: Annotated[float, Si("rad"), Field(alias="gear_phase")]
+    pitch_rms_m: Annotated[float, Si("m", ge=0), Field(alias="pitch_rms")]
+    surface_rms_m: Annotated[float, Si("m", ge=0), Field(alias="surface_rms")]
+    harmonics: Count
+
+
+class BallBearing(Strict):
+    """What the nameplate does not tell of the ball bearings."""
+
+    rows: Annotated[Count, Si("", ge=1, le=2)]
+    row_stagger: Fraction
+    radial_clearance_m: Annotated[float, Si("m", ge=0), Field(alias="radial_clearance")]
+    inner_groove_conformity: Annotated[float, Si("", gt=0.5, le=1)]
+    youngs_modulus_pa: Annotated[float, Si("Pa", gt=0), Field(alias="youngs_modulus")]
+    poisson_ratio: Annotated[float, Si("", ge=0, lt=0.5)]
+    nominal_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="nominal_stiffness")]
+
+
+class Pedestal(Strict):
+    """A bearing pedestal: a mass on springs, carrying a small mass that stands for a high resonance."""
+
+    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
+    stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="stiffness")]
+    damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
+    resonator_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="resonator_mass")]
+    resonator_frequency_hz: Annotated[float, Si("Hz", gt=0), Field(alias="resonator_frequency")]
+    resonator_damping_ratio: Annotated[float, Si("", ge=0, lt=1)]
+
+
+class Drive(Strict):
+    """Operating point at the start, and its limits."""
+
+    speed_hz: Annotated[float, Si("Hz", ge=0), Field(alias="speed")]
+    load_nm: Annotated[float, Si("N*m", ge=0), Field(alias="load")]
+    speed_limit_hz: Annotated[float, Si("Hz", gt=0), Field(alias="speed_limit")]
+    load_limit_nm: Annotated[float, Si("N*m", gt=0), Field(alias="load_limit")]
+
+
+class Physics(Strict):
+    """Off switches, one for each physics."""
+
+    mesh_stiffness_variation: bool = True
+    runout: bool = True
+    tooth_profile: bool = True
+    tooth_pitch: bool = True
+    tooth_surface: bool = True
+    ball_passing: bool = True
+    clearance: bool = True
+    gravity: bool = True
+    faults: bool = True
+
+
+class ParallelModel(Strict):
+    """The `model` section."""
+
+    kind: Literal["parallel_shaft"]
+    drive: Drive
+    flywheel_1: TorsionalEnd
+    flywheel_2: TorsionalEnd
+    encoder_1: TorsionalEnd
+    encoder_2: TorsionalEnd
+    pinion: Gear
+    gear: Gear
+    shafts: Shafts
+    seats: dict[str, Seat]
+    mesh: MeshStiffness
+    gear_errors: GearErrors
+    ball_bearing: BallBearing
+    pedestal: Pedestal
+    gravity_m_per_s2: Annotated[float, Si("m/s^2", ge=0), Field(alias="gravity")]
 
 
 class ParallelParams(Strict):
-    """Everything the 34-DOF model needs."""
+    """Everything that the 34-DOF model needs: `model` section, nameplate, switches."""
+
+    where: str
+    model: ParallelModel
+    mesh: GearMesh
+    bearings: tuple[Bearing, ...]
+    input_shaft: str
+    output_shaft: str
+    physics: Physics = Physics()
+
+    @property
+    def torque_ratio(self) -> float:
+        """Speed of the output shaft over that of the input shaft."""
+        return self.mesh.driving_teeth / self.mesh.driven_teeth
+
+    def with_physics(self, **switches: bool) -> ParallelParams:
+        """The same machine with some physics switched (`gravity=False`)."""
+        return self.model_copy(update={"physics": self.physics.model_copy(update=switches)})
 
 
-def load_parallel_params(machine: str | Path) -> ParallelParams:
-    """The `model` section of a machine description (with the nameplate's teeth and bearing geometry)."""
-    raise NotImplementedError
+def load_parallel_params(machine: str | Path = "unsw_parallel") -> ParallelParams:
+    """Parameters of a parallel-shaft machine.
+
+    Parameters
+    ----------
+    machine : str or Path
+        Name of a shipped machine description or path of a YAML file.
+
+    Raises
+    ------
+    InputError
+        If there is no usable `model` section, a number lacks unit or source, or it contradicts the
+        nameplate.
+    """
+    plate = load_machine(machine)
+    path, content = read_machine_file(machine)
+    where = f"{path}: model"
+    section = content.get("model")
+    if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
+        found = section.get("kind") if isinstance(section, dict) else section
+        raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine unsw_parallel has it")
+    model = validate(ParallelModel, section, where, require_source=True)
+    mesh = _single_mesh(where, plate)
+    params = ParallelParams(
+        where=where,
+        model=model,
+        mesh=mesh,
+        bearings=_bearings(where, plate, mesh),
+        input_shaft=mesh.driving_shaft,
+        output_shaft=mesh.driven_shaft,
+    )
+    _check(params)
+    return params
+
+
+def _single_mesh(where: str, plate: Machine) -> GearMesh:
+    if len(plate.gear_meshes) != 1:
+        raise InputError(where, "kind", f"{len(plate.gear_meshes)} gear meshes", "one gear mesh in nameplate")
+    mesh = plate.gear_meshes[0]
+    if mesh.driving_shaft != plate.reference_shaft:
+        raise InputError(where, "kind", plate.reference_shaft, "the driving shaft as reference_shaft")
+    return mesh
+
+
+def _bearings(where: str, plate: Machine, mesh: GearMesh) -> tuple[Bearing, ...]:
+    """The four bearings in the order of the model: two on the input, two on the output shaft."""
+    names = {bearing.name for bearing in plate.bearings}
+    if names != set(BEARINGS):
+        raise InputError(where, "bearings", sorted(names), ", ".join(BEARINGS))
+    found = tuple(plate.bearing(name) for name in BEARINGS)
+    shafts = (mesh.driving_shaft,) * 2 + (mesh.driven_shaft,) * 2
+    for bearing, shaft in zip(found, shafts, strict=True):
+        if bearing.shaft != shaft:
+            raise InputError(where, f"{bearing.name}.shaft", bearing.shaft, shaft)
+        if bearing.outer_ring_rotates:
+            raise InputError(where, f"{bearing.name}.outer_ring_rotates", True, "false")
+    return found
+
+
+def _check(params: ParallelParams) -> None:
+    """Contradictions between sections."""
+    model, where = params.model, params.where
+    if set(model.seats) != set(BEARINGS):
+        raise InputError(where, "seats", sorted(model.seats), ", ".join(BEARINGS))
+    radii = model.gear.base_radius_m / model.pinion.base_radius_m
+    teeth = params.mesh.driven_teeth / params.mesh.driving_teeth
+    if abs(radii / teeth - 1) > 1e-9:
+        raise InputError(where, "gear.base_radius", radii, f"radii in the ratio of the teeth, {teeth:.9g}")
+    if model.drive.speed_hz > model.drive.speed_limit_hz:
+        raise InputError(where, "drive.speed", model.drive.speed_hz, f"<= {model.drive.speed_limit_hz} Hz")
+    if model.drive.load_nm > model.drive.load_limit_nm:
+        raise InputError(where, "drive.load", model.drive.load_nm, f"<= {model.drive.load_limit_nm} N m")
