@@ -1,0 +1,64 @@
+"""The models that a scenario can name: each turns a scenario into something that runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+from gearsim_sim.engine import Engine, EngineOutput
+from gearsim_sim.events import Event, FaultSpec
+from gearsim_sim.params import load_parallel_params
+
+if TYPE_CHECKING:
+    from gearsim_sim.scenario import Scenario
+
+
+class RunningModel(Protocol):
+    """What the rig needs of a model; `gearsim_sim.engine.Engine` says what each part means."""
+
+    @property
+    def next_sample(self) -> int:
+        """Index of the first sample that the next `advance` returns."""
+        ...
+
+    @property
+    def earliest_event_sample(self) -> int:
+        """Earliest sample at which an event may start now."""
+        ...
+
+    def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:
+        """The next `n` samples."""
+        ...
+
+    def set_operating_point(
+        self,
+        speed_hz: float | None = None,
+        load_nm: float | None = None,
+        ramp_s: float = 1.0,
+        at_sample: int | None = None,
+    ) -> int:
+        """Schedule another operating point; returns its sample."""
+        ...
+
+    def inject(self, fault: FaultSpec, ramp_s: float = 0.1, at_sample: int | None = None) -> int:
+        """Schedule a fault; returns its sample."""
+        ...
+
+    def clear(self, fault_id: str = "", ramp_s: float = 0.1, at_sample: int | None = None) -> int:
+        """Schedule the end of a fault; returns its sample."""
+        ...
+
+
+def _lpm34(scenario: Scenario) -> RunningModel:
+    return Engine(
+        load_parallel_params(scenario.machine_path),
+        scenario.seed,
+        scenario.sample_rate_hz,
+        scenario.oversampling,
+        scenario.faults,
+        speed_hz=scenario.speed_hz,
+        load_nm=scenario.load_nm,
+    )
+
+
+MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = {"lpm34": _lpm34}

@@ -1,0 +1,183 @@
+"""How many samples are due: from a clock that is handed in, never from counted ticks.
+
+Knows neither ROS nor threads. All times are seconds of one clock that never runs backwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+_WINDOW_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class PaceReport:
+    """How the pacing goes.
+
+    Attributes
+    ----------
+    lag_s : float
+        Simulated seconds that are due and not yet made.
+    achieved : float
+        Simulated seconds per second of the clock over about the last two seconds, NaN before that is known.
+    wanted : float
+        The rate factor asked for; 0 means as fast as it goes.
+    slipped_s : float
+        Simulated seconds by which the schedule was put back because the machine could not keep up.
+    keeping_up : bool
+        False while the lag is more than `late_s` or the schedule was put back within the last two seconds.
+    """
+
+    lag_s: float
+    achieved: float
+    wanted: float
+    slipped_s: float
+    keeping_up: bool
+
+
+class Pacer:
+    """Turns clock time into a number of samples.
+
+    The schedule is a straight line: at `factor` times real time, sample n is due at start + n / (rate x
+    factor). After a stall the number due is therefore as exact as the clock, and the samples missed are
+    made at once. If more than `max_lag_s` of simulated time are due, the machine cannot keep up: the
+    schedule is put back so that just `max_lag_s` remain due. Simulated time then falls behind; no sample is
+    ever left out or added.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Samples per simulated second.
+    factor : float
+        Simulated seconds per second of the clock; 0 is as fast as it goes.
+    max_lag_s : float
+        Simulated seconds that may be due before the schedule is put back.
+    late_s : float
+        Lag above which the report says that the machine does not keep up.
+    """
+
+    def __init__(self, rate_hz: float, factor: float = 1.0, max_lag_s: float = 2.0, late_s: float = 0.5):
+        if not (math.isfinite(factor) and factor >= 0):
+            raise ValueError(f"rate factor {factor}: expected a finite number >= 0")
+        self._rate_hz = rate_hz
+        self._factor = factor
+        self._max_lag = round(max_lag_s * rate_hz)
+        self._late = late_s * rate_hz
+        self._made = 0
+        self._anchor_s: float | None = None
+        self._anchor_samples = 0.0
+        self._paused = False
+        self._slipped = 0
+        self._last_slip_s = -math.inf
+        self._history: deque[tuple[float, int]] = deque()
+
+    @property
+    def factor(self) -> float:
+        """Rate factor asked for."""
+        return self._factor
+
+    @property
+    def paused(self) -> bool:
+        """True between `pause` and `resume`."""
+        return self._paused
+
+    @property
+    def made(self) -> int:
+        """Samples made so far."""
+        return self._made
+
+    def start(self, now_s: float) -> None:
+        """Begin the schedule: sample 0 is due now. Does nothing if it has begun."""
+        if self._anchor_s is None:
+            self._anchor_s = now_s
+            self._history.append((now_s, self._made))
+
+    def due(self, now_s: float, most: int) -> int:
+        """Samples to make now, at most `most`; 0 before `start` and while paused."""
+        if self._anchor_s is None or self._paused:
+            return 0
+        if self._factor == 0:
+            return most
+        behind = self._target(now_s) - self._made
+        if behind > self._max_lag:
+            self._slip(behind - self._max_lag, now_s)
+            behind = self._max_lag
+        return max(0, min(behind, most))
+
+    def add(self, samples: int, now_s: float) -> None:
+        """Tell that so many samples were made; `now_s` is the time after making them."""
+        self._made += samples
+        self._history.append((now_s, self._made))
+        while len(self._history) > 2 and now_s - self._history[1][0] >= _WINDOW_S:
+            self._history.popleft()
+
+    def seconds_until(self, sample: int, now_s: float) -> float:
+        """Clock seconds until that many samples are due; infinite before `start` and in a pause."""
+        if self._anchor_s is None or self._paused:
+            return math.inf
+        if self._factor == 0:
+            return 0.0
+        due_s = self._anchor_s + (sample - self._anchor_samples) / (self._rate_hz * self._factor)
+        return max(0.0, due_s - now_s)
+
+    def set_factor(self, factor: float, now_s: float) -> None:
+        """Change the rate factor from now on; what is due until now stays due."""
+        if not (math.isfinite(factor) and factor >= 0):
+            raise ValueError(f"rate factor {factor}: expected a finite number >= 0")
+        self._anchor_at(now_s)
+        self._factor = factor
+
+    def pause(self, now_s: float) -> None:
+        """Stop the schedule; what is due until now stays due after `resume`."""
+        if not self._paused:
+            self._anchor_at(now_s)
+            self._paused = True
+
+    def resume(self, now_s: float) -> None:
+        """Let the schedule go on from now."""
+        if self._paused:
+            self._paused = False
+            if self._anchor_s is not None:
+                self._anchor_s = now_s
+            self._history.clear()
+            self._history.append((now_s, self._made))
+
+    def report(self, now_s: float) -> PaceReport:
+        """The state of the pacing."""
+        lag = 0
+        if self._anchor_s is not None and not self._paused and self._factor > 0:
+            lag = max(0, self._target(now_s) - self._made)
+        achieved = math.nan
+        if self._history and now_s - self._history[0][0] > 0.1:
+            first_s, first = self._history[0]
+            achieved = (self._made - first) / self._rate_hz / (now_s - first_s)
+        slipping = now_s - self._last_slip_s < _WINDOW_S
+        return PaceReport(
+            lag_s=lag / self._rate_hz,
+            achieved=achieved,
+            wanted=self._factor,
+            slipped_s=self._slipped / self._rate_hz,
+            keeping_up=lag <= self._late and not slipping,
+        )
+
+    def _target(self, now_s: float) -> int:
+        assert self._anchor_s is not None
+        exact = self._anchor_samples + (now_s - self._anchor_s) * self._rate_hz * self._factor
+        # A clock that was read a rounding error early must not hold back the sample that is due just now.
+        return math.floor(exact + 1e-6)
+
+    def _anchor_at(self, now_s: float) -> None:
+        if self._anchor_s is None or self._paused:
+            return
+        if self._factor == 0:
+            self._anchor_samples = float(self._made)
+        else:
+            self._anchor_samples += (now_s - self._anchor_s) * self._rate_hz * self._factor
+        self._anchor_s = now_s
+
+    def _slip(self, samples: int, now_s: float) -> None:
+        self._anchor_samples -= samples
+        self._slipped += samples
+        self._last_slip_s = now_s

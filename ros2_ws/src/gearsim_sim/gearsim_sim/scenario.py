@@ -1,0 +1,266 @@
+"""Scenarios: which machine runs how, what happens to it when, and what measures it.
+
+A scenario is a YAML file, shipped under a name in `gearsim_sim/scenarios` or of one's own. Every mistake in
+it is an InputError that names the file, the key, what was found and what is expected.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from gearsim_io.errors import InputError
+from gearsim_io.machines import load_machine, machine_file
+from gearsim_io.nameplate import Channel, Machine
+from gearsim_io.quantities import Si, Strict, read_yaml, validate
+from pydantic import Field, model_validator
+
+from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
+from gearsim_sim.models import MODELS
+from gearsim_sim.sensors.rows import SensorsModel, SensorTable, sensor_table
+
+FOLDER = Path(__file__).parent / "scenarios"
+# Fast DDS passes messages through shared memory only up to its segment size; larger ones are lost under load.
+_MOST_BATCH_BYTES = 480_000
+
+Seconds = Annotated[float, Si("s", ge=0, le=1e6)]
+Speed = Annotated[float, Si("Hz", gt=0, le=500)]
+Load = Annotated[float, Si("N*m", ge=0, le=1e5)]
+
+
+class OperatingPointModel(Strict):
+    """Speed of the reference shaft and load torque at the start."""
+
+    speed: Speed
+    load: Load
+
+
+class FaultModel(Strict):
+    """A fault; `params` have the unit in the key, such as `{width_m: 0.8 mm}`."""
+
+    kind: str = Field(min_length=1)
+    component: str = Field(min_length=1)
+    params: dict[str, Any] = Field(default_factory=dict)
+    severity: Annotated[float, Si("", ge=0, le=2)] = 1.0
+    id: str = ""
+
+    def spec(self) -> FaultSpec:
+        """As the engine takes it."""
+        return FaultSpec(self.kind, self.component, dict(self.params), self.severity, self.id)
+
+
+class InjectModel(FaultModel):
+    """A fault that begins and grows within `ramp`."""
+
+    ramp: Seconds = 0.1
+
+
+class SetModel(Strict):
+    """Another operating point, reached within `ramp`."""
+
+    speed: Speed | None = None
+    load: Load | None = None
+    ramp: Seconds = 1.0
+
+
+class ClearModel(Strict):
+    """The end of a fault (of all without `id`) within `ramp`."""
+
+    id: str = ""
+    ramp: Seconds = 0.1
+
+
+class EventModel(Strict):
+    """Something that happens at a time of the stream."""
+
+    at: Seconds
+    inject: InjectModel | None = None
+    set: SetModel | None = None
+    clear: ClearModel | None = None
+
+    @model_validator(mode="after")
+    def _just_one(self) -> EventModel:
+        if sum(part is not None for part in (self.inject, self.set, self.clear)) != 1:
+            raise ValueError("one of inject, set, clear beside at")
+        return self
+
+    def event(self, rate_hz: float) -> Event:
+        """As the engine takes it, at the nearest sample."""
+        sample = round(self.at * rate_hz)
+        if self.inject is not None:
+            return Inject(self.inject.spec(), self.inject.ramp, sample)
+        if self.set is not None:
+            return SetOperatingPoint(self.set.speed, self.set.load, self.set.ramp, sample)
+        assert self.clear is not None
+        return Clear(self.clear.id, self.clear.ramp, sample)
+
+
+class ScenarioModel(Strict):
+    """The file."""
+
+    description: str = ""
+    machine: str = "unsw_parallel"
+    model: str = "lpm34"
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    sample_rate: Annotated[float, Si("Hz", ge=1000, le=2e6)] = 65536.0
+    oversampling: Annotated[int, Field(ge=2, le=16)] = 4
+    batch_samples: Annotated[int, Field(ge=16, le=65536)] = 4096
+    rate_factor: Annotated[float, Si("", ge=0, le=1000)] = 1.0
+    operating_point: OperatingPointModel
+    sensors: SensorsModel = SensorsModel()
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    faults: tuple[FaultModel, ...] = ()
+    timeline: tuple[EventModel, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A checked scenario in SI units; build one by `load_scenario`.
+
+    Attributes
+    ----------
+    name, source : str
+        Name, and the file that it came from.
+    machine : Machine
+        Nameplate, with the channels of the sensor table.
+    machine_path : Path
+        Description of the machine, for the model's parameters.
+    speed_hz, load_nm : float
+        Operating point at the start.
+    parameters : mapping
+        Dotted names of model parameters and the values that replace those of the machine description.
+    faults : tuple of FaultSpec
+        Present from sample 0.
+    events : tuple of Event
+        What happens later, by ascending `at_sample`.
+    """
+
+    name: str
+    description: str
+    source: str
+    machine: Machine
+    machine_path: Path
+    model: str
+    seed: int
+    sample_rate_hz: float
+    oversampling: int
+    batch_samples: int
+    rate_factor: float
+    speed_hz: float
+    load_nm: float
+    sensors: SensorTable
+    parameters: Mapping[str, Any]
+    faults: tuple[FaultSpec, ...]
+    events: tuple[Event, ...]
+
+    def with_events(self, events: Sequence[Event]) -> Scenario:
+        """The same with other events, such as those of a live run's `GroundTruth.events`."""
+        return dataclasses.replace(self, events=tuple(sorted(events, key=lambda event: event.at_sample or 0)))
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Names of the shipped scenarios."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def scenario_file(name_or_path: str | Path) -> Path:
+    """The file of a scenario: a shipped name, or the path of a YAML file; InputError if it is neither."""
+    text = str(name_or_path)
+    shipped = FOLDER / f"{text}.yaml"
+    if "/" not in text and shipped.is_file():
+        return shipped
+    path = Path(name_or_path)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        return path
+    known = ", ".join(scenario_names())
+    raise InputError("scenario", "", text, f"one of {known}, or the path of a .yaml file")
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """The scenario of that name or file.
+
+    Raises
+    ------
+    InputError
+        Naming file, key, what was found and what is expected.
+    """
+    path = scenario_file(name_or_path)
+    return parse_scenario(read_yaml(path), path)
+
+
+def parse_scenario(content: Any, path: Path) -> Scenario:
+    """The content of a scenario file as a scenario; `path` names it and is where relative paths start."""
+    where = str(path)
+    if not isinstance(content, dict):
+        raise InputError(where, "", content, "a mapping of scenario keys")
+    model = validate(ScenarioModel, content, where)
+    if model.model not in MODELS:
+        raise InputError(where, "model", model.model, "one of " + ", ".join(sorted(MODELS)))
+    machine_path = _machine_path(model.machine, path)
+    machine = load_machine(machine_path)
+    table = sensor_table(model.sensors, machine, where)
+    _check_batch(model.batch_samples, len(table.accelerometers), where)
+    events = tuple(event.event(model.sample_rate) for event in model.timeline)
+    return Scenario(
+        name=path.stem,
+        description=model.description,
+        source=where,
+        machine=_measured(machine, table),
+        machine_path=machine_path,
+        model=model.model,
+        seed=model.seed,
+        sample_rate_hz=model.sample_rate,
+        oversampling=model.oversampling,
+        batch_samples=model.batch_samples,
+        rate_factor=model.rate_factor,
+        speed_hz=model.operating_point.speed,
+        load_nm=model.operating_point.load,
+        sensors=table,
+        parameters=model.parameters,
+        faults=tuple(fault.spec() for fault in model.faults),
+        events=(),
+    ).with_events(events)
+
+
+def _machine_path(name: str, scenario_path: Path) -> Path:
+    beside = scenario_path.parent / name
+    if beside.suffix in (".yaml", ".yml") and beside.is_file():
+        return beside
+    return machine_file(name)
+
+
+def _measured(machine: Machine, table: SensorTable) -> Machine:
+    """The nameplate of the machine with the sensors that the scenario puts on it."""
+    known = {channel.name: channel for channel in machine.channels}
+    channels = tuple(
+        dataclasses.replace(
+            known.get(row.channel, Channel(row.channel)),
+            axis=row.axis,
+            unit="m/s^2",
+            full_scale=math.nan if row.range_m_s2 is None else row.range_m_s2,
+        )
+        for row in table.accelerometers
+    )
+    names = {channel.name for channel in channels}
+    bearings = tuple(
+        dataclasses.replace(bearing, channels=tuple(name for name in bearing.channels if name in names))
+        for bearing in machine.bearings
+    )
+    return dataclasses.replace(
+        machine,
+        channels=channels,
+        bearings=bearings,
+        tacho_shafts=tuple(tacho.shaft for tacho in table.tachos),
+        encoder_shafts=tuple(encoder.shaft for encoder in table.encoders),
+    )
+
+
+def _check_batch(batch_samples: int, channels: int, where: str) -> None:
+    most = _MOST_BATCH_BYTES // (4 * channels)
+    if batch_samples > most:
+        expected = f"at most {most}, so that a message of {channels} channels passes through shared memory"
+        raise InputError(where, "batch_samples", batch_samples, expected)

@@ -1,0 +1,44 @@
+"""Range and word length of the analogue-to-digital converter.
+
+A converter of B bits and range R has 2^B codes of width 2 R / 2^B, from -R to R less one code; a value
+becomes the nearest code, and what lies outside becomes the outermost one (clipping).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_sim.sensors.rows import Accelerometer
+
+
+class Converter:
+    """Clipping and rounding of all channels, in place; a channel without range is left as it is."""
+
+    def __init__(self, rows: Sequence[Accelerometer]) -> None:
+        self._settings = [
+            (channel, row.range_m_s2, row.adc_bits)
+            for channel, row in enumerate(rows)
+            if row.range_m_s2 is not None
+        ]
+
+    @property
+    def active(self) -> bool:
+        """False if no channel has a range."""
+        return bool(self._settings)
+
+    def apply(self, block: NDArray[np.float64], first_sample: int) -> None:  # noqa: ARG002
+        """Convert `block` (channels, samples) to the values that the codes stand for."""
+        for channel, range_m_s2, bits in self._settings:
+            signal = block[channel]
+            if bits is None:
+                np.clip(signal, -range_m_s2, range_m_s2, out=signal)
+                continue
+            half = 2.0 ** (bits - 1)
+            step = range_m_s2 / half
+            signal *= 1.0 / step
+            np.rint(signal, out=signal)
+            np.clip(signal, -half, half - 1.0, out=signal)
+            signal *= step

@@ -1,0 +1,112 @@
+"""When a turning shaft passes equally spaced marks: the pulses of a tacho and the line edges of an encoder.
+
+Between two samples the angle is the cubic Hermite interpolant of angle and speed, so a passage is found far
+inside a sample. Angles come as whole turns and a fraction and stay exact over days.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+class EdgeFinder:
+    """Finds the first passage of each mark, in ascending order; a shaft that swings back makes no new edge.
+
+    Parameters
+    ----------
+    marks : int
+        Marks per turn.
+    phase_turns : float
+        Angle of mark 0 in turns.
+    """
+
+    def __init__(self, marks: int, phase_turns: float = 0.0) -> None:
+        self._marks = marks
+        self._phase = phase_turns
+        self._next: int | None = None
+
+    def find(
+        self,
+        turns: NDArray[np.int64],
+        fraction: NDArray[np.float64],
+        turns_per_sample: NDArray[np.float64],
+    ) -> tuple[int, NDArray[np.float64]]:
+        """Edges from the first sample up to, not including, the last.
+
+        Parameters
+        ----------
+        turns, fraction : ndarray, shape (samples + 1,)
+            Shaft angle as whole turns and the fraction of the next, 0 <= fraction < 1.
+        turns_per_sample : ndarray, shape (samples + 1,)
+            Its speed.
+
+        Returns
+        -------
+        first_edge : int
+            Index of the first edge found (or, without any, of the next one): edge k is mark k modulo
+            `marks`, passed at the angle phase + k / marks turns.
+        offsets : ndarray of float64
+            Where, as fractional samples from the first sample, ascending, below turns.size - 1.
+        """
+        if self._next is None:
+            self._next = self._first_mark(int(turns[0]), float(fraction[0]))
+        first = self._next
+        reach = float(np.max(turns - turns[0] + fraction)) + 1.0
+        out = np.empty(math.ceil(reach * self._marks) + 2)
+        count = _passages(turns, fraction, turns_per_sample, self._marks, self._phase, first, out)
+        self._next = first + count
+        return first, out[:count].copy()
+
+    def _first_mark(self, turns: int, fraction: float) -> int:
+        return turns * self._marks + math.ceil((fraction - self._phase) * self._marks)
+
+
+@njit(cache=True, nogil=True)
+def _passages(turns, fraction, speed, marks, phase, first, out):  # type: ignore[no-untyped-def]
+    count = 0
+    edge = first
+    edge_turns = edge // marks
+    edge_fraction = phase + (edge - edge_turns * marks) / marks
+    for i in range(turns.size - 1):
+        end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
+        while end > 0.0:
+            start = (turns[i] - edge_turns) + (fraction[i] - edge_fraction)
+            at = i + _root(start, end, speed[i], speed[i + 1])
+            # Rounding must not push the edge into the next interval, and so out of its batch.
+            out[count] = min(at, np.nextafter(i + 1.0, 0.0))
+            count += 1
+            edge += 1
+            edge_turns = edge // marks
+            edge_fraction = phase + (edge - edge_turns * marks) / marks
+            end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _root(p0, p1, m0, m1):  # type: ignore[no-untyped-def]
+    # First zero in [0, 1) of the cubic with values p0 <= 0 < p1 and slopes m0, m1: Newton, kept in a bracket.
+    if p0 >= 0.0:
+        return 0.0
+    c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
+    c3 = 2.0 * (p0 - p1) + m0 + m1
+    low = 0.0
+    high = 1.0
+    s = p0 / (p0 - p1)
+    for _ in range(60):
+        value = p0 + s * (m0 + s * (c2 + s * c3))
+        if value > 0.0:
+            high = s
+        else:
+            low = s
+        slope = m0 + s * (2.0 * c2 + s * 3.0 * c3)
+        following = s - value / slope if slope > 0.0 else 0.5 * (low + high)
+        if not (low <= following <= high):
+            following = 0.5 * (low + high)
+        if abs(following - s) < 1e-15:
+            return following
+        s = following
+    return s

@@ -1,0 +1,231 @@
+"""The accelerometer chain against scipy's filters, closed forms and simple counting."""
+
+import numpy as np
+import pytest
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Channel, Machine, Shaft
+from gearsim_io.quantities import validate
+from gearsim_sim.sensors.chain import STAGES, AccelerometerChain
+from gearsim_sim.sensors.delay import Delay, taps
+from gearsim_sim.sensors.noise import generator, normal
+from gearsim_sim.sensors.rolloff import lowpass
+from gearsim_sim.sensors.rows import Accelerometer, SensorsModel, catalogue, sensor_table
+from scipy import signal, stats
+
+RATE = 65536.0
+
+
+def _chain(*rows, rate=RATE, seed=1, sites=("a", "b")):
+    return AccelerometerChain(rows, sites, rate, seed)
+
+
+def _run(chain, motion, cuts=()):
+    """All samples of `motion` that have the context which the chain needs, in pieces ending at `cuts`."""
+    total = motion.shape[1] - chain.past - chain.ahead
+    edges = [0, *cuts, total]
+    pieces = []
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        window = motion[:, start : stop + chain.past + chain.ahead]
+        pieces.append(chain.process(window, start, stop - start))
+    return np.concatenate(pieces, axis=1)
+
+
+def _noise_motion(samples, seed=0):
+    return np.random.default_rng(seed).standard_normal((2, samples)) * 20
+
+
+@pytest.mark.parametrize("bandwidth_hz", [200.0, 3000.0, 10_000.0, 25_600.0])
+def test_rolloff_is_scipys_butterworth(bandwidth_hz):
+    b, a = signal.butter(2, bandwidth_hz, fs=RATE)
+    ours = lowpass(bandwidth_hz, RATE)
+    np.testing.assert_allclose(ours, (*b, *a[1:]), rtol=1e-9, atol=1e-12)
+    motion = _noise_motion(5000)
+    chain = _chain(Accelerometer("c", "b", bandwidth_hz=bandwidth_hz))
+    np.testing.assert_allclose(_run(chain, motion)[0], signal.lfilter(b, a, motion[1]), rtol=1e-5, atol=1e-5)
+
+
+def test_measured_response_is_3_db_down_at_the_bandwidth():
+    motion = np.zeros((2, 1 << 15))
+    motion[0, 0] = 1.0
+    chain = _chain(Accelerometer("c", "a", bandwidth_hz=4096.0))
+    gain = np.abs(np.fft.rfft(_run(chain, motion)[0]))
+    step_hz = RATE / motion.shape[1]
+    assert gain[round(4096 / step_hz)] == pytest.approx(np.sqrt(0.5), rel=1e-4)
+    assert gain[round(41 / step_hz)] == pytest.approx(1.0, abs=1e-4)
+    assert gain.max() < 1.0001  # no resonance
+    octave = gain[round(2048 / step_hz)] / gain[round(1024 / step_hz)]
+    assert octave == pytest.approx(np.sqrt((1 + 0.25**4) / (1 + 0.5**4)), rel=0.01)
+
+
+def test_bandwidth_beyond_the_sampled_band_changes_nothing():
+    motion = _noise_motion(1000)
+    chain = _chain(Accelerometer("c", "a", bandwidth_hz=25_600.0), rate=12_000.0)
+    np.testing.assert_array_equal(_run(chain, motion)[0], motion[0].astype(np.float32))
+
+
+@pytest.mark.parametrize("rate", [12_000.0, 65_536.0, 97_656.0])
+def test_noise_has_its_density_at_any_rate_and_is_white_and_normal(rate):
+    density = 3e-3
+    chain = _chain(Accelerometer("c", "a", noise_density=density), rate=rate)
+    noise = _run(chain, np.zeros((2, 1 << 18)))[0].astype(float)
+    frequency, psd = signal.welch(noise, rate, nperseg=2048)
+    level = np.sqrt(psd[2:-2])
+    assert np.median(level) == pytest.approx(density, rel=0.02)
+    thirds = np.array_split(level, 3)
+    assert max(t.mean() for t in thirds) / min(t.mean() for t in thirds) < 1.03
+    assert frequency[-1] == rate / 2
+    assert stats.kstest(noise[::7] / noise.std(), "norm").pvalue > 1e-3
+
+
+def test_noise_is_indexed_by_sample_number_and_named_by_channel():
+    whole = normal(generator(7, "x"), 10_000)
+    parts = generator(7, "x")
+    pieces = np.concatenate([normal(parts, n) for n in (1, 2, 3, 4097, 5897)])
+    np.testing.assert_array_equal(pieces, whole)
+    jumped = generator(7, "x").advance(1000)  # 1000 counter steps of 4 numbers
+    np.testing.assert_array_equal(normal(jumped, 50), whole[4000:4050])
+    others = [normal(generator(7, "y"), 10_000), normal(generator(8, "x"), 10_000)]
+    for other in others:
+        assert abs(np.corrcoef(whole, other)[0, 1]) < 0.05
+    alone = _run(_chain(Accelerometer("b", "b", noise_density=1e-3)), np.zeros((2, 500)))
+    rows = (Accelerometer("a", "a", noise_density=1e-3), Accelerometer("b", "b", noise_density=1e-3))
+    np.testing.assert_array_equal(_run(_chain(*rows), np.zeros((2, 500)))[1], alone[0])
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_quantisation_steps_codes_and_error(bits):
+    row = Accelerometer("c", "a", range_m_s2=50.0, adc_bits=bits)
+    motion = np.vstack([np.linspace(-60, 60, 200_001), np.zeros(200_001)])
+    out = _run(_chain(row), motion)[0].astype(float)
+    step = 100.0 / 2**bits
+    codes = out / step
+    assert np.abs(codes - np.rint(codes)).max() < 1e-6
+    assert codes.min() == -(2 ** (bits - 1))
+    assert codes.max() == 2 ** (bits - 1) - 1
+    inside = np.abs(motion[0]) < 50 - step
+    assert np.abs(out - motion[0])[inside].max() <= step / 2 * (1 + 1e-6)
+    if bits == 8:
+        assert np.std((out - motion[0])[inside]) == pytest.approx(step / np.sqrt(12), rel=0.02)
+
+
+def test_clipping_without_converter():
+    row = Accelerometer("c", "a", range_m_s2=5.0)
+    motion = _noise_motion(1000)
+    np.testing.assert_array_equal(_run(_chain(row), motion)[0], np.clip(motion[0], -5, 5).astype(np.float32))
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0, 0.25, 3.6, 40.9])
+def test_delay_moves_a_sine_by_exactly_so_much(delay):
+    chain = _chain(Accelerometer("c", "a", delay_s=delay / RATE), Accelerometer("d", "b"))
+    for frequency in (0.002, 0.05, 0.2, 0.4):
+        n = np.arange(-chain.past, 3000 + chain.ahead)
+        motion = np.vstack([np.sin(2 * np.pi * frequency * n)] * 2)
+        late, prompt = chain.process(motion, 0, 3000)
+        k = np.arange(3000)
+        np.testing.assert_allclose(late, np.sin(2 * np.pi * frequency * (k - delay)), atol=2e-4)
+        np.testing.assert_array_equal(prompt, np.sin(2 * np.pi * frequency * k).astype(np.float32))
+
+
+def test_delay_weights_keep_a_constant():
+    assert taps(0.3).sum() == pytest.approx(1.0, abs=1e-15)
+    assert Delay([Accelerometer("c", "a")], RATE).past == 0
+
+
+def test_everything_off_is_the_motion_itself():
+    motion = _noise_motion(2000)
+    chain = _chain(Accelerometer("c", "b"))
+    assert chain.past == chain.ahead == 0
+    np.testing.assert_array_equal(_run(chain, motion)[0], motion[1].astype(np.float32))
+
+
+def test_chunks_do_not_change_a_bit():
+    rows = [
+        Accelerometer("a", "a", "x", 30.0, 9000.0, 2e-3, 12, 2.5 / RATE),
+        Accelerometer("b", "b", "y", 1000.0, 25_600.0, 5e-4, 24, 0.0),
+        Accelerometer("c", "a", "x", None, 500.0, 1e-3, None, 7.0 / RATE),
+    ]
+    motion = _noise_motion(20_000)
+    whole = _run(_chain(*rows), motion)
+    cuts = np.cumsum(np.random.default_rng(3).integers(1, 700, 25))
+    np.testing.assert_array_equal(_run(_chain(*rows), motion, cuts), whole)
+    assert not np.array_equal(_run(_chain(*rows, seed=2), motion), whole)
+
+
+def test_every_stage_of_the_registry_can_be_off():
+    rows = [Accelerometer("c", "a")]
+    assert [name for name, build in STAGES if build(rows, RATE, 0).active] == []
+
+
+def test_unknown_site():
+    with pytest.raises(InputError, match="sensor c: site: got top, expected one of a, b"):
+        _chain(Accelerometer("c", "top"))
+
+
+def _machine(full_scale=float("nan")):
+    return Machine(
+        name="m",
+        description="",
+        reference_shaft="input",
+        shafts=(Shaft("input", 1.0, 10.0), Shaft("output", 1.0, 10.0)),
+        channels=(Channel("p", axis="x", full_scale=full_scale), Channel("q", axis="y")),
+        tacho_shafts=("input",),
+        encoder_shafts=("output",),
+    )
+
+
+def _table(content, **kwargs):
+    return sensor_table(validate(SensorsModel, content, "s.yaml"), _machine(**kwargs), "s.yaml")
+
+
+def test_default_table_follows_the_machine():
+    table = _table({}, full_scale=80.0)
+    assert [row.channel for row in table.accelerometers] == ["p", "q"]
+    assert table.accelerometers[0].range_m_s2 == 80.0
+    assert table.accelerometers[1].range_m_s2 == catalogue()["lab"].range
+    assert [t.shaft for t in table.tachos] == ["input"]
+    assert [(e.shaft, e.lines) for e in table.encoders] == [("output", 900)]
+
+
+def test_a_scenario_changes_all_or_one():
+    table = _table(
+        {
+            "accelerometers": {
+                "channels": ["q", "top"],
+                "all": {"noise_density": "off", "bandwidth": "8 kHz"},
+                "each": {"top": {"site": "p", "range": "2 kilometer/s^2", "delay": "3 us", "axis": "z"}},
+            },
+            "encoders": {"shafts": [], "lines": 1024},
+        }
+    )
+    q, top = table.accelerometers
+    assert q.noise_density is None
+    assert q.bandwidth_hz == top.bandwidth_hz == 8000
+    assert (top.site, top.range_m_s2, top.axis) == ("p", 2000, "z")
+    assert top.delay_s == pytest.approx(3e-6)
+    assert table.encoders == ()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"accelerometers": {"chain": "x"}}, r"sensors.accelerometers.chain: got x, expected one of ideal, "),
+        (
+            {"accelerometers": {"channels": ["p", "z"]}},
+            "sensors.accelerometers.channels: got z, expected one",
+        ),
+        ({"accelerometers": {"channels": ["p", "p"]}}, "expected each channel once"),
+        ({"accelerometers": {"channels": ["p"], "each": {"q": {}}}}, "listed under channels"),
+        ({"accelerometers": {"all": {"range": "off"}}}, "24 bits without a range"),
+        ({"accelerometers": {"all": {"range": "-1 m/s^2"}}}, r"a number in m/s\^2, > 0, or off"),
+        ({"accelerometers": {"all": {"range": "10 V"}}}, r"\(not V\)"),
+        ({"accelerometers": {"all": {"adc_bits": 12.5}}}, "whole number of adc_bits"),
+        ({"tachos": {"shafts": ["rear"]}}, "sensors.tachos: shafts: got rear, expected one of input, output"),
+        ({"encoders": {"lines": 0}}, "encoders.lines: got 0"),
+        ({"microphones": {}}, "no such key; one of accelerometers, encoders, tachos"),
+    ],
+)
+def test_bad_tables_are_told_in_one_line(content, message):
+    with pytest.raises(InputError, match=message) as caught:
+        _table(content)
+    assert str(caught.value).startswith("s.yaml: ")
+    assert "\n" not in str(caught.value)
