@@ -1,0 +1,147 @@
+"""What a monitor says of one window of all channels, and what becomes of it in alarms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds
+from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.results import Alarm, AlarmState, Features, Spectrum
+from gearsim_dsp.streams.assembler import Batch, WindowAssembler
+
+__all__ = ["AlarmedMonitor", "Monitor", "Outcome", "Report"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """All that a monitor found in one window.
+
+    Parameters
+    ----------
+    run : int
+        Start of the stream that the window belongs to.
+    first_sample, end_sample : int
+    last_ns : int
+        Time of the window's last sample.
+    frame_id : str
+    features, spectra : what is to be published, for each channel that could be judged.
+    indications : tuple of Indication
+        Signs of faults, at most one for each group.
+    tests : int
+        Statistical tests made in this window (groups times channels), for the alarms' thresholds.
+    judged : bool
+        False when no channel could be judged; then the window says nothing about any fault.
+    note : str
+        What stood in the way, for people; empty if nothing.
+    quality : tuple of QualityIssue
+    results : tuple
+        The analysis itself (`window.WindowResult` of each channel), for those who combine windows.
+    """
+
+    run: int
+    first_sample: int
+    end_sample: int
+    last_ns: int
+    frame_id: str
+    features: tuple[Features, ...]
+    spectra: tuple[Spectrum, ...]
+    indications: tuple[Indication, ...]
+    tests: int
+    judged: bool
+    note: str
+    quality: tuple[QualityIssue, ...]
+    results: tuple[Any, ...] = ()
+
+
+class Monitor(Protocol):
+    """A streaming analysis: batches in, reports out, no clock."""
+
+    source: str
+    assembler: WindowAssembler
+
+    def push(self, batch: Batch) -> list[Report]:
+        """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
+        ...
+
+    def finish(self) -> list[Report]:
+        """The end of the input: reports of the windows that still waited for something."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """A report with the changes of alarms it leads to.
+
+    `present` is the alarm state after it; `state_due` is true when that is to be published: on every change
+    and at least every 10 s of the stream.
+    """
+
+    report: Report
+    alarms: tuple[Alarm, ...]
+    present: AlarmState
+    state_due: bool
+
+
+class AlarmedMonitor:
+    """A monitor and its alarms.
+
+    Parameters
+    ----------
+    monitor : Monitor
+    settings : AlarmSettings
+    """
+
+    def __init__(self, monitor: Monitor, settings: AlarmSettings | None = None) -> None:
+        self.monitor = monitor
+        self.settings = settings or AlarmSettings()
+        self._book: AlarmBook | None = None
+        self._run = 0
+        self._tests = 0
+        self._note = ""
+
+    @property
+    def assembler(self) -> WindowAssembler:
+        """Where the monitor's windows are made, with the counts of gaps and the like."""
+        return self.monitor.assembler
+
+    def push(self, batch: Batch) -> list[Outcome]:
+        """Take one batch; return what became of the windows that are complete now."""
+        return [self._outcome(report) for report in self.monitor.push(batch)]
+
+    def finish(self) -> list[Outcome]:
+        """The end of the input."""
+        return [self._outcome(report) for report in self.monitor.finish()]
+
+    def withdraw(self, why: str) -> list[Alarm]:
+        """Take all alarms back, as of the last window judged."""
+        if self._book is None:
+            return []
+        last = self._book.state()
+        return self._book.reset(last.t_ns, last.sample, why)
+
+    def _outcome(self, report: Report) -> Outcome:
+        changes: list[Alarm] = []
+        book = self._book
+        if book is None or report.tests != self._tests or report.frame_id != book.frame_id:
+            changes += self._back(report, "the source changed")
+            self._book = book = self._new_book(report)
+        elif report.run != self._run:
+            changes += self._back(report, "the stream began again")
+        self._run = report.run
+        note = "" if report.judged else report.note
+        news = note != self._note
+        self._note = note
+        if report.judged:
+            changes += book.judge(Judgement(report.last_ns, report.end_sample - 1, report.indications))
+        due = book.state_due()
+        return Outcome(report, tuple(changes), book.state(note, bool(note)), due or bool(changes) or news)
+
+    def _back(self, report: Report, why: str) -> list[Alarm]:
+        return self._book.reset(report.last_ns, report.end_sample - 1, why) if self._book else []
+
+    def _new_book(self, report: Report) -> AlarmBook:
+        self._tests = report.tests
+        hop_s = self.assembler.settings.hop_s
+        thresholds = Thresholds.derive(self.settings, max(report.tests, 1), hop_s)
+        return AlarmBook(self.monitor.source, report.frame_id, self.settings, thresholds)
