@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import PulseTrain
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
-__all__ = ["Phase", "ShaftSpeed", "SpeedSource"]
+__all__ = ["Phase", "ShaftSpeed", "SpeedSource", "nameplate_speed", "phase_from_pulses", "window_speed"]
 
 SpeedSource = Literal["tacho", "encoder", "estimated", "nameplate"]
+
+_BOUNCE = 0.4
+_LOCAL_INTERVALS = 9
+_DOUBT = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +62,11 @@ class ShaftSpeed:
     phase: Phase | None = None
     note: str = ""
 
+    @property
+    def relative_error(self) -> float:
+        """Half the 95 % interval over the value."""
+        return 0.5 * (self.ci95_hz[1] - self.ci95_hz[0]) / self.value_hz
+
     def to_json(self) -> dict[str, object]:
         """The `speed_hz` object of `diagnose --json` (null where nothing is known)."""
         known = bool(np.isfinite(self.value_hz))
@@ -62,3 +75,159 @@ class ShaftSpeed:
             "ci95": [float(v) for v in self.ci95_hz] if known else None,
             "source": self.source,
         }
+
+
+def nameplate_speed(machine: Machine, note: str = "") -> ShaftSpeed:
+    """The nominal speed with the nameplate's tolerance as its interval."""
+    value = machine.nominal_speed_hz
+    half = machine.speed_tolerance
+    return ShaftSpeed(value, (value * (1 - half), value * (1 + half)), "nameplate", None, note)
+
+
+def window_speed(
+    pulses: Sequence[PulseTrain],
+    sample_count: int,
+    sample_rate_hz: float,
+    machine: Machine,
+    source: SpeedSource = "tacho",
+) -> ShaftSpeed:
+    """Speed and phase over one window from the angle signals there are, else from the nameplate.
+
+    Parameters
+    ----------
+    pulses : sequence of PulseTrain
+        In samples from the window's start; those of the reference shaft are preferred, others are converted
+        by their shaft's ratio.
+    sample_count : int
+        Length of the window.
+    sample_rate_hz : float
+    machine : Machine
+    source : {"tacho", "encoder"}
+        What the pulses are.
+
+    Returns
+    -------
+    ShaftSpeed
+        From the nameplate when no train has two pulses in the window, with a note that says so.
+    """
+    ranked = sorted(pulses, key=lambda train: (train.shaft != machine.reference_shaft, -train.samples.size))
+    for train in ranked:
+        if train.samples.size < 2:
+            continue
+        ratio = machine.shaft(train.shaft).ratio
+        speed = phase_from_pulses(train.samples, train.pulses_per_revolution * ratio, sample_count)
+        if speed is not None:
+            return _in_hz(speed, sample_count, sample_rate_hz, source)
+    note = f"no {source} pulses in this window" if pulses else ""
+    return nameplate_speed(machine, note)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Track:
+    phase: Phase
+    jitter_samples: float
+    note: str
+
+
+def phase_from_pulses(
+    pulse_samples: NDArray[np.float64], pulses_per_turn: float, sample_count: int
+) -> _Track | None:
+    """Angle over [0, sample_count) from pulses, with bounces dropped and missing pulses filled in by count.
+
+    Parameters
+    ----------
+    pulse_samples : ndarray of float64
+        Ascending sample indices.
+    pulses_per_turn : float
+        Pulses in one turn of the reference shaft.
+    sample_count : int
+
+    Returns
+    ------- phase with the jitter of the pulses in samples (root mean square) and a note; None with fewer
+    than two pulses.
+
+    Notes
+    -----
+    An interval below 0.4 of the local median is a bounce: its later pulse is dropped. An interval near a
+    multiple of the local median has swallowed pulses: the angle is counted on by that multiple. Beyond the
+    first and last pulse the angle goes on at the mean of the last three intervals.
+    """
+    kept = np.asarray(pulse_samples, dtype=np.float64)
+    kept, dropped = _without_bounces(kept)
+    if kept.size < 2:
+        return None
+    intervals = np.diff(kept)
+    local = _local_median(intervals)
+    # The median itself may stand for two: a count is relative to the shortest interval that is not a bounce.
+    counts = np.maximum(1.0, np.round(intervals / local))
+    doubtful = int(np.count_nonzero(np.abs(intervals / local - counts) > _DOUBT))
+    turns = np.concatenate(([0.0], np.cumsum(counts))) / pulses_per_turn
+    per_pulse = intervals / counts
+    notes = []
+    if dropped:
+        notes.append(f"{dropped} double pulses dropped")
+    if missing := int(np.sum(counts - 1)):
+        notes.append(f"{missing} missing pulses filled in")
+    if doubtful:
+        notes.append(f"{doubtful} intervals fit no whole number of pulses")
+    samples, turns = _extended(kept, turns, per_pulse, counts, sample_count)
+    return _Track(Phase(samples, turns), _jitter(per_pulse), ", ".join(notes))
+
+
+def _without_bounces(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    dropped = 0
+    while samples.size >= 3:
+        intervals = np.diff(samples)
+        short = intervals < _BOUNCE * _local_median(intervals)
+        if not np.any(short):
+            break
+        first = np.flatnonzero(short)
+        first = first[np.concatenate(([True], np.diff(first) > 1))]
+        samples = np.delete(samples, first + 1)
+        dropped += int(first.size)
+    return samples, dropped
+
+
+def _local_median(intervals: NDArray[np.float64]) -> NDArray[np.float64]:
+    if intervals.size < 3:
+        return np.full(intervals.size, float(np.median(intervals)))
+    size = min(_LOCAL_INTERVALS, intervals.size - (1 - intervals.size % 2))
+    return np.asarray(median_filter(intervals, size, mode="nearest"))
+
+
+def _extended(
+    samples: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    per_pulse: NDArray[np.float64],
+    counts: NDArray[np.float64],
+    sample_count: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Knots at the window's ends too, at the speed of the three intervals next to them."""
+    end = float(sample_count - 1)
+    per_turn = (turns[1] - turns[0]) / counts[0]
+    if samples[0] > 0:
+        rate = per_turn / np.mean(per_pulse[:3])
+        turns = np.concatenate(([turns[0] - samples[0] * rate], turns))
+        samples = np.concatenate(([0.0], samples))
+    if samples[-1] < end:
+        rate = per_turn / np.mean(per_pulse[-3:])
+        turns = np.concatenate((turns, [turns[-1] + (end - samples[-1]) * rate]))
+        samples = np.concatenate((samples, [end]))
+    return samples, turns
+
+
+def _jitter(per_pulse: NDArray[np.float64]) -> float:
+    """White jitter from the intervals' second differences, whose variance is 20 times the jitter's."""
+    if per_pulse.size < 3:
+        return 0.01 * float(np.mean(per_pulse))
+    third = np.diff(per_pulse, 2)
+    return float(np.sqrt(np.mean(third**2) / 20.0))
+
+
+def _in_hz(track: _Track, sample_count: int, sample_rate_hz: float, source: SpeedSource) -> ShaftSpeed:
+    ends = np.interp([0.0, sample_count - 1.0], track.phase.samples, track.phase.turns)
+    seconds = (sample_count - 1) / sample_rate_hz
+    value = float(ends[1] - ends[0]) / seconds
+    half = 1.96 * np.sqrt(2.0) * track.jitter_samples / (sample_count - 1) * value
+    half = max(half, 1e-9 * value)
+    return ShaftSpeed(value, (value - half, value + half), source, track.phase, track.note)

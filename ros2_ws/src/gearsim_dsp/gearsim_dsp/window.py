@@ -1,11 +1,11 @@
 """One channel over one window of samples: what goes in and what comes out of the analysis.
 
-The monitor that streams windows works like this::
+A monitor that streams windows works like this::
 
-    speed = window_speed(...)                       # speed.py: tacho, encoder, estimate or nameplate
+    speed = window_speed(window.pulses, n, sample_rate_hz, machine)          # speed.py
     results = [analyse_window(WindowInput(...)) for each channel]
-    pool.add(results)                               # evidence.py: EvidencePool averages over windows
-    findings = pool.findings()                      # decide.py: which component, which fault, how sure
+    pool.add(results)                                                        # evidence.py
+    findings = find_faults(machine, pool.evidence()).findings                # decide.py
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 from numpy.typing import NDArray
 
-from gearsim_dsp.quality import QualityIssue
-from gearsim_dsp.speed import ShaftSpeed
+from gearsim_dsp.bands import Band, BandPlan, plan_bands
+from gearsim_dsp.envelope import (
+    Envelopes,
+    WindowSpectrum,
+    order_spectrum,
+    squared_envelopes,
+    suppress_lines,
+    window_spectrum,
+)
+from gearsim_dsp.quality import QualityIssue, check_samples
+from gearsim_dsp.speed import Phase, ShaftSpeed
 
-__all__ = ["Band", "BandSpectrum", "WindowInput", "WindowResult"]
-
-
-@dataclass(frozen=True, slots=True)
-class Band:
-    """A frequency band in Hz, 0 < low < high; `why` tells who chose it, such as "kurtogram" or "bank"."""
-
-    low_hz: float
-    high_hz: float
-    why: str = "given"
+__all__ = ["Band", "BandSpectrum", "LowSpectrum", "WindowInput", "WindowResult", "analyse_window"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class WindowInput:
     machine : Machine
         The nameplate.
     bands : tuple of Band
-        Bands to demodulate; empty: the bank of bands of `bands.default_bands`.
+        Bands to demodulate beside the bank of `bands.plan_bands`, such as one given or the kurtogram's.
     """
 
     samples: NDArray[np.float32] | NDArray[np.float64]
@@ -72,23 +72,52 @@ class WindowInput:
 class BandSpectrum:
     """The squared envelope spectrum of one band over one window, in orders of the reference shaft.
 
-    `power` is float64 of shape (lines,): mean square per line of the squared envelope divided by its own
-    mean, so it has no unit; line k is at k * `order_step`. `variance_share` is the part of the whole
-    signal's mean square that the band holds.
+    Parameters
+    ----------
+    band : Band
+    order_step : float
+        Line k is at k * `order_step`.
+    power : ndarray of float32, shape (lines,)
+        Of the squared envelope divided by its own mean, so without unit: a modulation of depth m gives
+        m^2 / 4.
+    level : float
+        Mean square of the band's signal, in the signal's unit squared.
+    kurtosis : float
+        Excess kurtosis of the band's complex envelope, 0 for Gaussian noise.
     """
 
     band: Band
     order_step: float
-    power: NDArray[np.float64]
-    variance_share: float
+    power: NDArray[np.float32]
+    level: float
+    kurtosis: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LowSpectrum:
+    """Power spectrum of the signal itself at low frequencies, line k at k * `step_hz` (for shaft and
+    supply).
+    """
+
+    step_hz: float
+    power: NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowResult:
     """All that is known of one channel after one window.
 
-    `spectra` is empty when the window cannot be judged (then `quality` says why). `kurtosis_by_band` has
-    one value per spectrum: excess kurtosis of the band's complex envelope, 0 for Gaussian noise.
+    Parameters
+    ----------
+    axis_speed_hz : float
+        Speed that one order of the spectra stands for: the shaft's mean speed where its phase is known, else
+        the nameplate's, so that all windows of a stream share an axis.
+    turns : float
+        Turns of the reference shaft behind each envelope spectrum, by that speed.
+    quality : tuple of QualityIssue
+        Why `spectra` is empty, if it is.
+    spectra : tuple of BandSpectrum
+    low : LowSpectrum or None
     """
 
     channel: str
@@ -96,6 +125,95 @@ class WindowResult:
     sample_count: int
     sample_rate_hz: float
     speed: ShaftSpeed
+    axis_speed_hz: float
+    turns: float
     quality: tuple[QualityIssue, ...]
     spectra: tuple[BandSpectrum, ...]
-    kurtosis_by_band: tuple[float, ...]
+    low: LowSpectrum | None
+
+
+def analyse_window(window: WindowInput) -> WindowResult:
+    """Check the samples and make the squared envelope spectra of all bands.
+
+    Notes
+    ----- A window that cannot be judged (not finite, constant, too short, rate too low) gives no spectra
+    and a fatal quality issue; nothing is raised for what a signal may bring.
+    """
+    issues = list(check_samples(window.samples, window.channel))
+    speed = window.speed
+    axis_speed = speed.value_hz
+    plan: BandPlan | None = None
+    if not any(issue.fatal for issue in issues):
+        plan, more = plan_bands(window.samples.size, window.sample_rate_hz, axis_speed, window.machine)
+        issues += [QualityIssue(issue, window.channel, detail, True) for issue, detail in more]
+    spectra: tuple[BandSpectrum, ...] = ()
+    low: LowSpectrum | None = None
+    turns = float("nan")
+    if not any(issue.fatal for issue in issues):
+        spectrum = window_spectrum(window.samples, window.sample_rate_hz)
+        low = _low_spectrum(spectrum)
+        if plan is not None:
+            spectra, turns = _spectra(spectrum, window, plan)
+    return WindowResult(
+        window.channel,
+        window.first_sample,
+        int(window.samples.size),
+        window.sample_rate_hz,
+        speed,
+        axis_speed,
+        turns,
+        tuple(issues),
+        spectra,
+        low,
+    )
+
+
+def _low_spectrum(spectrum: WindowSpectrum) -> LowSpectrum:
+    top = min(spectrum.lines.size - 1, round(4000.0 / spectrum.step_hz))
+    lines = spectrum.lines[: top + 1]
+    # Hann's window as its convolution with the lines, for clean neighbours of strong lines.
+    hann = np.zeros(top, dtype=np.complex64)
+    hann[1:] = lines[1:top] - np.float32(0.5) * (lines[: top - 1] + lines[2 : top + 1])
+    power = (hann.real**2 + hann.imag**2) * np.float32(2.0 / spectrum.samples**2)
+    return LowSpectrum(spectrum.step_hz, power)
+
+
+def _spectra(
+    spectrum: WindowSpectrum, window: WindowInput, plan: BandPlan
+) -> tuple[tuple[BandSpectrum, ...], float]:
+    clean = suppress_lines(spectrum)
+    phase = window.speed.phase or _steady_phase(window)
+    bands = list(plan.bank)
+    envelopes = [squared_envelopes(clean, np.array([b.low_hz for b in bands]), plan.width_hz)]
+    for extra in window.bands:
+        fitted = plan.fit(extra)
+        bands.append(fitted)
+        envelopes.append(squared_envelopes(clean, np.array([fitted.low_hz]), fitted.high_hz - fitted.low_hz))
+    result: list[BandSpectrum] = []
+    for block in envelopes:
+        power = order_spectrum(block, phase, plan.top_order, plan.order_step).astype(np.float32)
+        level, kurtosis = _moments(block)
+        for row in range(power.shape[0]):
+            band = bands[len(result)]
+            result.append(
+                BandSpectrum(band, plan.order_step, power[row], float(level[row]), float(kurtosis[row]))
+            )
+    return tuple(result), _turns(envelopes[0], phase)
+
+
+def _steady_phase(window: WindowInput) -> Phase:
+    last = float(max(window.samples.size - 1, 1))
+    turns = last / window.sample_rate_hz * window.speed.value_hz
+    return Phase(np.array([0.0, last]), np.array([0.0, turns]))
+
+
+def _turns(envelopes: Envelopes, phase: Phase) -> float:
+    ends = envelopes.first + envelopes.stride * np.array([0, envelopes.values.shape[1] - 1])
+    low, high = np.interp(ends, phase.samples, phase.turns)
+    return float(high - low)
+
+
+def _moments(envelopes: Envelopes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    level = envelopes.values.mean(axis=1, dtype=np.float64)
+    square = np.mean(envelopes.values**2, axis=1, dtype=np.float64)
+    return level, square / np.maximum(level**2, np.finfo(np.float64).tiny) - 2.0

@@ -1,0 +1,106 @@
+"""Which bands to demodulate: a bank that covers the spectrum, wide enough for the fault lines sought."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gearsim_io.nameplate import Machine
+
+from gearsim_dsp.kinematics import fault_families
+
+__all__ = ["Band", "BandPlan", "plan_bands"]
+
+TOP_SHARE = 0.46
+"""Highest share of the sampling rate used: above lie anti-alias filters, where a few quanta look impulsive.
+"""
+
+_MAX_BANDS = 12
+_MIN_TURNS = 8.0
+_HARMONICS = 8
+_BAND_HARMONICS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A frequency band in Hz, 0 < low < high; `why` tells who chose it, such as "kurtogram" or "bank"."""
+
+    low_hz: float
+    high_hz: float
+    why: str = "given"
+
+
+@dataclass(frozen=True, slots=True)
+class BandPlan:
+    """The bank of bands (all `width_hz` wide) and the order axis of their envelope spectra."""
+
+    bank: tuple[Band, ...]
+    width_hz: float
+    top_order: float
+    order_step: float
+    floor_hz: float
+    ceiling_hz: float
+    least_width_hz: float
+
+    def fit(self, band: Band) -> Band:
+        """The band moved and widened as little as needed to hold the lines sought inside the usable range."""
+        width = min(max(band.high_hz - band.low_hz, self.least_width_hz), self.ceiling_hz - self.floor_hz)
+        centre = 0.5 * (band.low_hz + band.high_hz)
+        low = min(max(centre - 0.5 * width, self.floor_hz), self.ceiling_hz - width)
+        return Band(low, low + width, band.why)
+
+
+def plan_bands(
+    samples: int, sample_rate_hz: float, speed_hz: float, machine: Machine
+) -> tuple[BandPlan | None, list[tuple[str, str]]]:
+    """Plan the bank for windows of `samples` samples.
+
+    Parameters
+    ----------
+    samples : int
+    sample_rate_hz, speed_hz : float
+        `speed_hz` is the reference shaft's, by tacho or nameplate.
+    machine : Machine
+        Its fault families say how wide a band must be: twice the highest fundamental with its sidebands.
+
+    Returns
+    -------
+    plan : BandPlan or None
+        None when there is nothing to look for (no bearings, or no speed) or the window does not allow it.
+    issues : list of (issue, detail)
+        Why the window does not allow it: "too_short" or "rate_too_low".
+    """
+    families = fault_families(machine)
+    if not families or not (math.isfinite(speed_hz) and speed_hz > 0):
+        return None, []
+    turns = samples / sample_rate_hz * speed_hz
+    nominal_turns = samples / sample_rate_hz * machine.nominal_speed_hz
+    need = _MIN_TURNS
+    if turns < need:
+        least = f"at least {need:.0f} are needed ({need / speed_hz:.2g} s at {speed_hz:.3g} Hz)"
+        return None, [("too_short", f"{turns:.1f} turns of the shaft; {least}")]
+    reach = max(f.order + f.sideband_order for f in families)
+    least_width = 2.2 * reach * speed_hz
+    good_width = _BAND_HARMONICS * least_width
+    step_hz = sample_rate_hz / samples
+    floor = max(4 * step_hz, 0.005 * sample_rate_hz)
+    ceiling = TOP_SHARE * sample_rate_hz
+    if ceiling - floor < max(least_width, 32 * step_hz):
+        need_hz = (least_width + floor) / TOP_SHARE
+        return None, [
+            ("rate_too_low", f"{sample_rate_hz:g} Hz; at least {need_hz:.0f} Hz are needed for these lines")
+        ]
+    count = min(_MAX_BANDS, max(1, int((ceiling - floor) / max(good_width, 32 * step_hz))))
+    width = (ceiling - floor) / count
+    bank = tuple(Band(floor + k * width, floor + (k + 1) * width, "bank") for k in range(count))
+    top = min(_HARMONICS * max(f.order for f in families), 0.8 * width / speed_hz)
+    step = _order_step(turns, nominal_turns)
+    return BandPlan(bank, width, top, step, floor, ceiling, least_width), []
+
+
+def _order_step(turns: float, nominal_turns: float) -> float:
+    """Half the resolution of the nominal number of turns; the same for all speeds near the nominal one."""
+    lines = 1.1 * nominal_turns if math.isfinite(nominal_turns) else 1.1 * turns
+    while lines < turns:
+        lines *= 1.25
+    return 0.5 / math.ceil(lines)

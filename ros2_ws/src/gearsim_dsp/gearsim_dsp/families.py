@@ -1,0 +1,265 @@
+"""How strongly the averaged spectra of one channel show a fault family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gearsim_io.nameplate import Machine
+from numpy.typing import NDArray
+
+from gearsim_dsp.bands import Band
+from gearsim_dsp.comb import CombGrid, comb_grid, score_combs
+from gearsim_dsp.evidence import ChannelSpectra
+from gearsim_dsp.kinematics import FaultFamily
+from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
+from gearsim_dsp.speed import ShaftSpeed
+
+__all__ = ["FamilyEvidence", "FamilySearch", "Judged"]
+
+_BLOCK_LINES = 160
+_SKIP_LINES = 4
+_LINE_HALF_WIDTH = 1.6
+_CLEAR = 12.0
+_SIDEBANDS_EXPLAINED = 5
+_SIMPLE_RATIOS = tuple(p / q for p in range(1, 5) for q in range(1, 5) if p != q)
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyEvidence:
+    """How strongly one channel shows one fault family, after one or many windows.
+
+    Parameters
+    ----------
+    family : FaultFamily
+    channel : str
+    band : Band
+        Band in which it shows best.
+    found_order, found_hz : float
+        The comb's fundamental: its harmonics' interpolated peaks, weighted by their precision.
+    harmonic_snr_db, sideband_snr_db : tuple of float
+        Power over the local floor at harmonics 1, 2, ... and at the stronger sideband of each of the first.
+    snr_db : float
+        The strongest of the first four harmonics.
+    false_alarm_probability : float
+        That noise shows as much anywhere in the bands, channels, families and orders searched.
+    modulation : float
+        Mean square of the family's lines in the squared envelope over its squared mean (effect size).
+    windows : int
+        Windows averaged.
+    """
+
+    family: FaultFamily
+    channel: str
+    band: Band
+    found_order: float
+    found_hz: float
+    harmonic_snr_db: tuple[float, ...]
+    sideband_snr_db: tuple[float, ...]
+    snr_db: float
+    false_alarm_probability: float
+    modulation: float
+    windows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Evidence of one channel with what only the decision needs.
+
+    `dominance` is the family's modulation over that of the strongest unrelated comb in the same band,
+    `amplitude` the modulated power of all bands in the signal's unit squared (to compare channels).
+    """
+
+    evidence: FamilyEvidence
+    dominance: float
+    amplitude: float
+
+
+class FamilySearch:
+    """Looks for fault families in the averaged spectra of one channel.
+
+    Parameters
+    ----------
+    machine : Machine
+    spectra : ChannelSpectra
+    speed : ShaftSpeed
+        Where the spectra's axis counts nameplate speed, its value corrects the axis and its interval widens
+        the search.
+    looks : int
+        Channels times families searched in all, for the false-alarm probability.
+    """
+
+    def __init__(self, machine: Machine, spectra: ChannelSpectra, speed: ShaftSpeed, looks: int) -> None:
+        self._spectra = spectra
+        self._looks = looks
+        self._scale = speed.value_hz / spectra.axis_speed_hz
+        self._doubt = max(speed.relative_error, 0.0)
+        self._resolution = 1.0 / spectra.turns
+        floor = local_floor(spectra.power, _BLOCK_LINES, spectra.averages, _SKIP_LINES)
+        self._excess = spectra.power - floor
+        self._ratio, self._tail = self._with_mean(spectra.power / floor)
+        self._usable = self._free_of_shafts(machine)
+
+    def _with_mean(self, ratio: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rows of the bands and, when there are several, one for their mean: weak lines are in many bands."""
+        averages = self._spectra.averages
+        worth = 0.45 * _BLOCK_LINES / 2
+        tail = LineTail(averages, averages * worth)(ratio)
+        bands = ratio.shape[0]
+        if bands < 2:
+            return ratio, tail
+        mean = np.asarray(ratio.mean(axis=0, keepdims=True), dtype=np.float64)
+        mean /= local_floor(mean, _BLOCK_LINES, averages * bands, _SKIP_LINES)
+        mean_tail = LineTail(averages * bands, averages * bands * worth)(mean)
+        return np.vstack([ratio, mean]), np.vstack([tail, mean_tail])
+
+    def _free_of_shafts(self, machine: Machine) -> NDArray[np.bool_]:
+        """False at harmonics of the shafts; gear meshes with their sidebands are among these."""
+        order = self._axis()
+        usable = order > 0.0
+        usable[:_SKIP_LINES] = False
+        for shaft in machine.shafts:
+            turn = shaft.ratio * self._scale
+            number = np.round(order / turn)
+            width = _LINE_HALF_WIDTH * self._resolution + self._doubt * order
+            usable &= np.abs(order - number * turn) > np.minimum(width, 0.25 * turn)
+        return np.asarray(usable)
+
+    def _axis(self) -> NDArray[np.float64]:
+        lines = np.arange(self._spectra.power.shape[1], dtype=np.float64)
+        return np.asarray(lines * self._spectra.order_step)
+
+    def judge(self, family: FaultFamily) -> Judged:
+        """Evidence of a family on this channel."""
+        half_width = family.tolerance + self._doubt
+        grid = self._grid(family, family.order * self._scale, half_width)
+        scores = score_combs(self._tail, self._usable, grid)
+        row, best = np.unravel_index(int(np.argmax(scores.score)), scores.score.shape)
+        trials = scores.score.shape[0] * self._independent_orders(family, half_width)
+        p = search_false_alarm(float(np.exp(-scores.score[row, best])), trials * self._looks)
+        modulation = self._modulation(grid, int(best))
+        band = self._band(scores.score[:, best], modulation, trials)
+        found = self._refined(grid, int(best), int(row))
+        evidence = self._evidence(family, grid, int(best), band, found, p, float(modulation[band]))
+        amplitude = float(np.sum(self._spectra.level * np.sqrt(2 * modulation)))
+        return Judged(evidence, self._dominance(family, found, band, float(modulation[band])), amplitude)
+
+    def _grid(self, family: FaultFamily, order: float, half_width: float) -> CombGrid:
+        lines = self._spectra.power.shape[1]
+        sideband = family.sideband_order * self._scale
+        return comb_grid(order, half_width, self._spectra.order_step, lines, sideband, self._resolution)
+
+    def _independent_orders(self, family: FaultFamily, half_width: float) -> float:
+        return 1.0 + 2 * half_width * family.order * 8 / self._resolution
+
+    def _modulation(self, grid: CombGrid, at: int) -> NDArray[np.float64]:
+        """Mean square of a comb's lines, per band: a line of power m^2 / 4 is a cosine of mean square m^2 /
+        2.
+        """
+        index = np.concatenate([grid.harmonics[at], grid.sidebands[at].ravel()])
+        index = np.unique(index[(index >= 0)])
+        index = index[self._usable[index]]
+        return np.asarray(2.0 * np.maximum(self._excess[:, index], 0.0).sum(axis=1))
+
+    def _band(self, score: NDArray[np.float64], modulation: NDArray[np.float64], trials: float) -> int:
+        """The band with the largest modulation among those where the comb itself is significant."""
+        bands = modulation.size
+        clear = score[:bands] - np.log(trials) > _CLEAR
+        if not np.any(clear):
+            return int(np.argmax(score[:bands]))
+        return int(np.argmax(np.where(clear, modulation, -1.0)))
+
+    def _refined(self, grid: CombGrid, at: int, row: int) -> float:
+        """Fundamental on the axis from the interpolated peaks of the harmonics that stand out clearly."""
+        spectrum = self._ratio[row]
+        rough = float(grid.fundamentals[at])
+        weights, values = 0.0, 0.0
+        for number, index in enumerate(grid.harmonics[at], start=1):
+            if not 2 <= index < spectrum.size - 2 or not self._usable[index]:
+                continue
+            window = spectrum[index - 2 : index + 3]
+            peak = int(np.argmax(window))
+            if peak in (0, 4) or window[peak] < 4.0:
+                continue
+            left, mid, right = np.log(np.maximum(window[peak - 1 : peak + 2], 1e-12))
+            shift = 0.5 * (right - left) / max(2 * mid - left - right, 1e-9)
+            order = (index - 2 + peak + shift) * self._spectra.order_step
+            weight = number**2 * min(float(window[peak]), 100.0)
+            values += weight * order / number
+            weights += weight
+        return values / weights if weights > 0 else rough
+
+    def _evidence(
+        self,
+        family: FaultFamily,
+        grid: CombGrid,
+        at: int,
+        band: int,
+        found: float,
+        p: float,
+        modulation: float,
+    ) -> FamilyEvidence:
+        ratio = self._ratio[band]
+        harmonics = [self._db(ratio, i) for i in grid.harmonics[at] if i >= 0]
+        sidebands = [
+            max(self._db(ratio, i) for i in pair if i >= 0)
+            for pair in grid.sidebands[at]
+            if np.any(pair >= 0)
+        ]
+        spectra = self._spectra
+        return FamilyEvidence(
+            family,
+            spectra.channel,
+            spectra.bands[band],
+            found / self._scale,
+            found * spectra.axis_speed_hz,
+            tuple(harmonics),
+            tuple(sidebands),
+            max(harmonics[:4], default=float("nan")),
+            p,
+            modulation,
+            spectra.windows,
+        )
+
+    @staticmethod
+    def _db(ratio: NDArray[np.float64], index: np.intp) -> float:
+        return float(10 * np.log10(max(float(ratio[index]), 1e-3)))
+
+    def _dominance(self, family: FaultFamily, found: float, band: int, modulation: float) -> float:
+        """The family's modulation over that of the strongest unrelated comb between 0.5 and 2 times its
+        order.
+        """
+        spacing = self._resolution / 16
+        candidates = np.arange(0.5 * found, 2.0 * found, spacing)
+        near = np.full(candidates.size, False)
+        width = np.maximum(2 * self._resolution, (family.tolerance + self._doubt) * candidates)
+        for ratio in (1.0, *_SIMPLE_RATIOS):
+            near |= np.abs(candidates - ratio * found) < width
+        for spacing_order in {self._scale, family.sideband_order * self._scale} - {0.0}:
+            for number in (-3, -2, -1, 1, 2, 3):
+                near |= np.abs(candidates - found - number * spacing_order) < 2 * self._resolution
+        candidates = candidates[~near]
+        if candidates.size == 0:
+            return float("inf")
+        numbers = np.arange(1, 9)
+        index = np.round(candidates[:, None] * numbers / self._spectra.order_step).astype(np.intp)
+        inside = index < self._excess.shape[1]
+        index = np.where(inside, index, 0)
+        power = np.maximum(self._excess[band, index], 0.0) * (inside & self._usable[index])
+        return modulation / max(float(np.max(2.0 * power.sum(axis=1))), 1e-12)
+
+    def explain(self, family: FaultFamily, found_order: float) -> None:
+        """Take the lines of a family that was found out of the search for others."""
+        found = found_order * self._scale
+        order = self._axis()
+        number = np.maximum(1.0, np.round(order / found))
+        width = _LINE_HALF_WIDTH * self._resolution + 0.002 * order
+        self._usable &= np.abs(order - number * found) > width
+        side = family.sideband_order * self._scale
+        if side <= 0:
+            return
+        for k in range(1, _SIDEBANDS_EXPLAINED + 1):
+            for sign in (-1, 1):
+                shifted = order - sign * k * side
+                number = np.maximum(1.0, np.round(shifted / found))
+                self._usable &= np.abs(shifted - number * found) > width
