@@ -17,18 +17,26 @@ others.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from gearsim_io.nameplate import Machine
 
 from gearsim_dsp.evidence import EvidencePool
-from gearsim_dsp.families import FamilyEvidence, FamilySearch, Judged
+from gearsim_dsp.families import FamilyEvidence, FamilySearch
 from gearsim_dsp.kinematics import FaultFamily, fault_families
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.speed import ShaftSpeed
 
-__all__ = ["ALARM_PROBABILITY", "MODULATION_LIMIT", "Finding", "Verdict", "find_faults"]
+__all__ = [
+    "ALARM_PROBABILITY",
+    "DOMINANCE_LIMIT",
+    "MODULATION_LIMIT",
+    "Finding",
+    "Verdict",
+    "find_faults",
+    "is_fault",
+]
 
 ALARM_PROBABILITY = 1e-4
 MODULATION_LIMIT = 0.06
@@ -112,16 +120,22 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
     open_groups = list(groups)
     while open_groups and len(findings) < _MOST_FINDINGS:
         best = max(open_groups, key=lambda g: _strength(latest[id(g)]))
-        if not _accepted(_best(latest[id(best)])):
+        if not is_fault(_best(latest[id(best)])):
             break
         findings.append(_finding(machine, best, latest[id(best)], speed))
         open_groups.remove(best)
+        open_groups = [g for g in open_groups if not _accompanies(g, findings[-1])]
         for search in searches:
-            search.explain(best.first, _best(latest[id(best)]).evidence.found_order)
+            search.explain(best.first, _best(latest[id(best)]).found_order)
         for group in open_groups:
             latest[id(group)] = _judge(group, searches)
-    evidence = tuple(_renamed(_best(latest[id(g)]).evidence, family) for g in groups for family in g.families)
+    evidence = tuple(replace(_best(latest[id(g)]), family=family) for g in groups for family in g.families)
     return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed)
+
+
+def _accompanies(group: _Group, finding: Finding) -> bool:
+    """A damaged race is struck harder by some elements than by others, so cage lines come with it."""
+    return group.first.fault == "cage" and any(f.component == finding.component for f in group.families)
 
 
 def _groups(machine: Machine) -> list[_Group]:
@@ -132,39 +146,38 @@ def _groups(machine: Machine) -> list[_Group]:
     return [_Group(tuple(families)) for families in found.values()]
 
 
-def _judge(group: _Group, searches: list[FamilySearch]) -> list[Judged]:
+def _judge(group: _Group, searches: list[FamilySearch]) -> list[FamilyEvidence]:
     return [search.judge(group.first) for search in searches]
 
 
-def _best(judged: list[Judged]) -> Judged:
+def _best(judged: list[FamilyEvidence]) -> FamilyEvidence:
     """The channel that decides: the largest modulation among those improbable enough, else the least
     probable.
     """
-    sure = [j for j in judged if j.evidence.false_alarm_probability < ALARM_PROBABILITY]
+    sure = [e for e in judged if e.false_alarm_probability < ALARM_PROBABILITY]
     if sure:
-        return max(sure, key=lambda j: j.evidence.modulation * min(j.dominance, DOMINANCE_LIMIT))
-    return min(judged, key=lambda j: j.evidence.false_alarm_probability)
+        return max(sure, key=lambda e: e.modulation * min(e.dominance, DOMINANCE_LIMIT))
+    return min(judged, key=lambda e: e.false_alarm_probability)
 
 
-def _strength(judged: list[Judged]) -> float:
+def _strength(judged: list[FamilyEvidence]) -> float:
     best = _best(judged)
-    return best.evidence.modulation if _accepted(best) else 0.0
+    return best.modulation if is_fault(best) else 0.0
 
 
-def _accepted(judged: Judged) -> bool:
-    evidence = judged.evidence
+def is_fault(evidence: FamilyEvidence) -> bool:
+    """True when a family is improbable as noise, large, and no other's lines: all three limits hold."""
     return (
         evidence.false_alarm_probability < ALARM_PROBABILITY
         and evidence.modulation >= MODULATION_LIMIT
-        and judged.dominance >= DOMINANCE_LIMIT
+        and evidence.dominance >= DOMINANCE_LIMIT
     )
 
 
-def _finding(machine: Machine, group: _Group, judged: list[Judged], speed: ShaftSpeed) -> Finding:
-    best = _best(judged)
+def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], speed: ShaftSpeed) -> Finding:
+    evidence = _best(judged)
     family, shares = _component(machine, group, judged)
-    evidence = best.evidence
-    confidence = _confidence(best)
+    confidence = _confidence(evidence)
     details: dict[str, object] = {
         "channel": evidence.channel,
         "band_hz": [evidence.band.low_hz, evidence.band.high_hz],
@@ -174,7 +187,7 @@ def _finding(machine: Machine, group: _Group, judged: list[Judged], speed: Shaft
         "sideband_snr_db": [round(v, 2) for v in evidence.sideband_snr_db],
         "false_alarm_probability": evidence.false_alarm_probability,
         "modulation": evidence.modulation,
-        "dominance": best.dominance,
+        "dominance": evidence.dominance,
         "windows": evidence.windows,
         "speed_source": speed.source,
     }
@@ -195,11 +208,13 @@ def _finding(machine: Machine, group: _Group, judged: list[Judged], speed: Shaft
     )
 
 
-def _component(machine: Machine, group: _Group, judged: list[Judged]) -> tuple[FaultFamily, dict[str, float]]:
+def _component(
+    machine: Machine, group: _Group, judged: list[FamilyEvidence]
+) -> tuple[FaultFamily, dict[str, float]]:
     """Which of several like bearings: the one whose own channels carry most of the modulation."""
     if len(group.families) == 1:
         return group.first, {}
-    by_channel = {j.evidence.channel: j.amplitude for j in judged}
+    by_channel = {e.channel: e.amplitude for e in judged}
     shares = {}
     for family in group.families:
         near = [by_channel[c] for c in machine.bearing(family.component).channels if c in by_channel]
@@ -213,12 +228,11 @@ def _component(machine: Machine, group: _Group, judged: list[Judged]) -> tuple[F
     return best, shares
 
 
-def _confidence(judged: Judged) -> float:
+def _confidence(evidence: FamilyEvidence) -> float:
     """A smooth margin over the three limits: 0.5 at each limit, towards 0.99 well above all of them."""
-    evidence = judged.evidence
     size = _logistic(2.5 * math.log(evidence.modulation / MODULATION_LIMIT))
     sure = 1.0 - min(1.0, evidence.false_alarm_probability)
-    own = _logistic(4.0 * math.log(max(judged.dominance, 1e-3) / DOMINANCE_LIMIT) + 1.0)
+    own = _logistic(4.0 * math.log(max(evidence.dominance, 1e-3) / DOMINANCE_LIMIT) + 1.0)
     return float(min(0.99, size * sure * own))
 
 
@@ -232,11 +246,11 @@ def _severity(modulation: float) -> str:
     return "moderate" if modulation >= 0.25 else "slight"
 
 
-def _notes(groups: list[_Group], latest: dict[int, list[Judged]]) -> list[QualityIssue]:
+def _notes(groups: list[_Group], latest: dict[int, list[FamilyEvidence]]) -> list[QualityIssue]:
     """Families that are there without doubt and too weak to be called a fault."""
     notes = []
     for group in groups:
-        evidence = _best(latest[id(group)]).evidence
+        evidence = _best(latest[id(group)])
         weak = 0.25 * MODULATION_LIMIT <= evidence.modulation < MODULATION_LIMIT
         if (
             weak
@@ -250,19 +264,3 @@ def _notes(groups: list[_Group], latest: dict[int, list[Judged]]) -> list[Qualit
             )
             notes.append(QualityIssue("weak_modulation", evidence.channel, detail))
     return notes
-
-
-def _renamed(evidence: FamilyEvidence, family: FaultFamily) -> FamilyEvidence:
-    return FamilyEvidence(
-        family,
-        evidence.channel,
-        evidence.band,
-        evidence.found_order,
-        evidence.found_hz,
-        evidence.harmonic_snr_db,
-        evidence.sideband_snr_db,
-        evidence.snr_db,
-        evidence.false_alarm_probability,
-        evidence.modulation,
-        evidence.windows,
-    )

@@ -15,7 +15,7 @@ from gearsim_dsp.kinematics import FaultFamily
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
 from gearsim_dsp.speed import ShaftSpeed
 
-__all__ = ["FamilyEvidence", "FamilySearch", "Judged"]
+__all__ = ["FamilyEvidence", "FamilySearch"]
 
 _BLOCK_LINES = 160
 _SKIP_LINES = 4
@@ -45,6 +45,10 @@ class FamilyEvidence:
         That noise shows as much anywhere in the bands, channels, families and orders searched.
     modulation : float
         Mean square of the family's lines in the squared envelope over its squared mean (effect size).
+    dominance : float
+        The family's modulation over that of the strongest unrelated comb in the same band.
+    amplitude : float
+        Modulated power of all bands in the signal's unit squared, to compare channels.
     windows : int
         Windows averaged.
     """
@@ -59,20 +63,9 @@ class FamilyEvidence:
     snr_db: float
     false_alarm_probability: float
     modulation: float
-    windows: int
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """Evidence of one channel with what only the decision needs.
-
-    `dominance` is the family's modulation over that of the strongest unrelated comb in the same band,
-    `amplitude` the modulated power of all bands in the signal's unit squared (to compare channels).
-    """
-
-    evidence: FamilyEvidence
     dominance: float
     amplitude: float
+    windows: int
 
 
 class FamilySearch:
@@ -129,7 +122,7 @@ class FamilySearch:
         lines = np.arange(self._spectra.power.shape[1], dtype=np.float64)
         return np.asarray(lines * self._spectra.order_step)
 
-    def judge(self, family: FaultFamily) -> Judged:
+    def judge(self, family: FaultFamily) -> FamilyEvidence:
         """Evidence of a family on this channel."""
         half_width = family.tolerance + self._doubt
         grid = self._grid(family, family.order * self._scale, half_width)
@@ -140,9 +133,23 @@ class FamilySearch:
         modulation = self._modulation(grid, int(best))
         band = self._band(scores.score[:, best], modulation, trials)
         found = self._refined(grid, int(best), int(row))
-        evidence = self._evidence(family, grid, int(best), band, found, p, float(modulation[band]))
-        amplitude = float(np.sum(self._spectra.level * np.sqrt(2 * modulation)))
-        return Judged(evidence, self._dominance(family, found, band, float(modulation[band])), amplitude)
+        harmonics, sidebands = self._snr_db(grid, int(best), band)
+        spectra = self._spectra
+        return FamilyEvidence(
+            family=family,
+            channel=spectra.channel,
+            band=spectra.bands[band],
+            found_order=found / self._scale,
+            found_hz=found * spectra.axis_speed_hz,
+            harmonic_snr_db=harmonics,
+            sideband_snr_db=sidebands,
+            snr_db=max(harmonics[:4], default=float("nan")),
+            false_alarm_probability=p,
+            modulation=float(modulation[band]),
+            dominance=self._dominance(family, found, band, float(modulation[band])),
+            amplitude=float(np.sum(spectra.level * np.sqrt(2 * modulation))),
+            windows=spectra.windows,
+        )
 
     def _grid(self, family: FaultFamily, order: float, half_width: float) -> CombGrid:
         lines = self._spectra.power.shape[1]
@@ -189,37 +196,11 @@ class FamilySearch:
             weights += weight
         return values / weights if weights > 0 else rough
 
-    def _evidence(
-        self,
-        family: FaultFamily,
-        grid: CombGrid,
-        at: int,
-        band: int,
-        found: float,
-        p: float,
-        modulation: float,
-    ) -> FamilyEvidence:
+    def _snr_db(self, grid: CombGrid, at: int, band: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
         ratio = self._ratio[band]
         harmonics = [self._db(ratio, i) for i in grid.harmonics[at] if i >= 0]
-        sidebands = [
-            max(self._db(ratio, i) for i in pair if i >= 0)
-            for pair in grid.sidebands[at]
-            if np.any(pair >= 0)
-        ]
-        spectra = self._spectra
-        return FamilyEvidence(
-            family,
-            spectra.channel,
-            spectra.bands[band],
-            found / self._scale,
-            found * spectra.axis_speed_hz,
-            tuple(harmonics),
-            tuple(sidebands),
-            max(harmonics[:4], default=float("nan")),
-            p,
-            modulation,
-            spectra.windows,
-        )
+        pairs = [[self._db(ratio, i) for i in pair if i >= 0] for pair in grid.sidebands[at]]
+        return tuple(harmonics), tuple(max(pair) for pair in pairs if pair)
 
     @staticmethod
     def _db(ratio: NDArray[np.float64], index: np.intp) -> float:
