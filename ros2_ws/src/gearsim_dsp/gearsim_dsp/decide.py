@@ -76,12 +76,17 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What the spectra say: findings, the evidence of every family on its best channel, notes, the speed."""
+    """What the spectra say: findings, the evidence of every family on its best channel, notes, the speed.
+
+    `by_channel` holds the evidence of every group of like families (under the name of its first) on every
+    channel, before the lines of a finding were taken out for others.
+    """
 
     findings: tuple[Finding, ...]
     evidence: tuple[FamilyEvidence, ...]
     notes: tuple[QualityIssue, ...]
     speed: ShaftSpeed
+    by_channel: tuple[FamilyEvidence, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +121,7 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
     looks = len(groups) * len(channels)
     searches = [FamilySearch(machine, spectra, speed, looks) for spectra in channels]
     latest = {id(group): _judge(group, searches) for group in groups}
+    by_channel = tuple(evidence for group in groups for evidence in latest[id(group)])
     findings: list[Finding] = []
     open_groups = list(groups)
     while open_groups and len(findings) < _MOST_FINDINGS:
@@ -130,7 +136,7 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
         for group in open_groups:
             latest[id(group)] = _judge(group, searches)
     evidence = tuple(replace(_best(latest[id(g)]), family=family) for g in groups for family in g.families)
-    return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed)
+    return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed, by_channel)
 
 
 def _accompanies(group: _Group, finding: Finding) -> bool:
