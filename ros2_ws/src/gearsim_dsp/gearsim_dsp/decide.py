@@ -39,9 +39,10 @@ __all__ = [
 ]
 
 ALARM_PROBABILITY = 1e-4
-MODULATION_LIMIT = 0.06
+MODULATION_LIMIT = 0.12
 DOMINANCE_LIMIT = 1.6
 _MOST_FINDINGS = 4
+_CAGE_FUNDAMENTAL_DB = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +178,7 @@ def is_fault(evidence: FamilyEvidence) -> bool:
         evidence.false_alarm_probability < ALARM_PROBABILITY
         and evidence.modulation >= MODULATION_LIMIT
         and evidence.dominance >= DOMINANCE_LIMIT
+        and (evidence.family.fault != "cage" or evidence.harmonic_snr_db[0] >= _CAGE_FUNDAMENTAL_DB)
     )
 
 

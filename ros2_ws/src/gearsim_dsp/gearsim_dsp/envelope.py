@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 _EDGE_SHARE = 0.04
-_LINE_LIMIT = 3.0
+_LINE_LIMIT = 10.0
 _BLOCK_LINES = 128
 
 

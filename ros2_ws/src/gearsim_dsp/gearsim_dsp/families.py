@@ -22,7 +22,6 @@ _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _CLEAR = 12.0
 _SIDEBANDS_EXPLAINED = 5
-_SIMPLE_RATIOS = tuple(p / q for p in range(1, 5) for q in range(1, 5) if p != q)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,40 +206,33 @@ class FamilySearch:
         return float(10 * np.log10(max(float(ratio[index]), 1e-3)))
 
     def _dominance(self, family: FaultFamily, found: float, band: int, modulation: float) -> float:
-        """The family's modulation over that of the strongest unrelated comb between 0.5 and 2 times its
-        order.
+        """The family's modulation over that of the strongest comb made of lines it does not explain.
+
+        Combs between 0.5 and 2 times the order, all with eight harmonics.
         """
-        spacing = self._resolution / 16
-        candidates = np.arange(0.5 * found, 2.0 * found, spacing)
-        near = np.full(candidates.size, False)
-        width = np.maximum(2 * self._resolution, (family.tolerance + self._doubt) * candidates)
-        for ratio in (1.0, *_SIMPLE_RATIOS):
-            near |= np.abs(candidates - ratio * found) < width
-        for spacing_order in {self._scale, family.sideband_order * self._scale} - {0.0}:
-            for number in (-3, -2, -1, 1, 2, 3):
-                near |= np.abs(candidates - found - number * spacing_order) < 2 * self._resolution
-        candidates = candidates[~near]
-        if candidates.size == 0:
-            return float("inf")
-        numbers = np.arange(1, 9)
-        index = np.round(candidates[:, None] * numbers / self._spectra.order_step).astype(np.intp)
+        unexplained = self._usable & ~self._lines_of(family, found)
+        candidates = np.arange(0.5 * found, 2.0 * found, self._resolution / 16)
+        index = np.round(candidates[:, None] * np.arange(1, 9) / self._spectra.order_step).astype(np.intp)
         inside = index < self._excess.shape[1]
         index = np.where(inside, index, 0)
-        power = np.maximum(self._excess[band, index], 0.0) * (inside & self._usable[index])
+        power = np.maximum(self._excess[band, index], 0.0) * (inside & unexplained[index])
         return modulation / max(float(np.max(2.0 * power.sum(axis=1))), 1e-12)
 
     def explain(self, family: FaultFamily, found_order: float) -> None:
         """Take the lines of a family that was found out of the search for others."""
-        found = found_order * self._scale
+        self._usable &= ~self._lines_of(family, found_order * self._scale)
+
+    def _lines_of(self, family: FaultFamily, found: float) -> NDArray[np.bool_]:
+        """Harmonics of the fundamental, with sidebands of the shaft's and of the family's own spacing."""
         order = self._axis()
-        number = np.maximum(1.0, np.round(order / found))
         width = _LINE_HALF_WIDTH * self._resolution + 0.002 * order
-        self._usable &= np.abs(order - number * found) > width
-        side = family.sideband_order * self._scale
-        if side <= 0:
-            return
-        for k in range(1, _SIDEBANDS_EXPLAINED + 1):
-            for sign in (-1, 1):
-                shifted = order - sign * k * side
-                number = np.maximum(1.0, np.round(shifted / found))
-                self._usable &= np.abs(shifted - number * found) > width
+        shifts = {0.0}
+        if family.order < 1.0:
+            return np.asarray(np.abs(order - np.maximum(1.0, np.round(order / found)) * found) < width)
+        for spacing in {self._scale, family.sideband_order * self._scale} - {0.0}:
+            shifts |= {k * spacing for k in range(-_SIDEBANDS_EXPLAINED, _SIDEBANDS_EXPLAINED + 1)}
+        lines = np.zeros(order.size, dtype=np.bool_)
+        for shift in shifts:
+            number = np.maximum(1.0, np.round((order - shift) / found))
+            lines |= np.abs(order - shift - number * found) < width
+        return lines
