@@ -1,22 +1,44 @@
+"""Builds gearsim_bringup. Its name, version, description and maintainer are in package.xml alone."""
+
+from glob import glob
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
 
-NAME = "gearsim_bringup"
+HERE = Path(__file__).resolve().parent
+ABOUT = ElementTree.parse(HERE / "package.xml").getroot()
+NAME = ABOUT.findtext("name")
+VERSION = ABOUT.findtext("version")
 
 setup(
     name=NAME,
-    version="0.1.0",
-    description="Command line, scenarios and launch files of the gearsim test rig.",
-    license="Apache-2.0",
-    author="gearsim maintainers",
-    maintainer="gearsim maintainers",
-    maintainer_email="maintainers@example.com",
+    version=VERSION,
+    description=ABOUT.findtext("description"),
+    license=ABOUT.findtext("license"),
+    author=ABOUT.findtext("maintainer"),
+    maintainer=ABOUT.findtext("maintainer"),
+    maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
     ],
-    install_requires=["setuptools"],
+    # What runs without ROS; rclpy and the messages come with ROS, see package.xml.
+    install_requires=[
+        "click>=8.1",
+        "rich>=13",
+        "psutil>=5.9",
+        f"gearsim_io=={VERSION}",
+        f"gearsim_sim=={VERSION}",
+        f"gearsim_dsp=={VERSION}",
+    ],
     zip_safe=False,
-    entry_points={"console_scripts": []},
+    entry_points={
+        "console_scripts": [
+            "gearsim = gearsim_bringup.cli:main",
+        ]
+    },
 )

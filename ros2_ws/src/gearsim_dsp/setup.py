@@ -1,22 +1,40 @@
+"""Builds gearsim_dsp. Its name, version, description and maintainer are in package.xml alone."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
 
-NAME = "gearsim_dsp"
+HERE = Path(__file__).resolve().parent
+ABOUT = ElementTree.parse(HERE / "package.xml").getroot()
+NAME = ABOUT.findtext("name")
+VERSION = ABOUT.findtext("version")
 
 setup(
     name=NAME,
-    version="0.1.0",
-    description="Signal processing, diagnosis and the diagnostic nodes of the gearsim test rig.",
-    license="Apache-2.0",
-    author="gearsim maintainers",
-    maintainer="gearsim maintainers",
-    maintainer_email="maintainers@example.com",
+    version=VERSION,
+    description=ABOUT.findtext("description"),
+    license=ABOUT.findtext("license"),
+    author=ABOUT.findtext("maintainer"),
+    maintainer=ABOUT.findtext("maintainer"),
+    maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["setuptools"],
+    # What runs without ROS; rclpy and the messages come with ROS, see package.xml.
+    install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        f"gearsim_io=={VERSION}",
+    ],
     zip_safe=False,
-    entry_points={"console_scripts": []},
+    entry_points={
+        "console_scripts": [
+            "envelope = gearsim_dsp.nodes.envelope:main",
+            "kurtosis = gearsim_dsp.nodes.kurtosis:main",
+        ]
+    },
 )

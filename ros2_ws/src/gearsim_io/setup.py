@@ -1,10 +1,16 @@
+"""Builds gearsim_io. Its name, version, description and maintainer are in package.xml alone."""
+
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
 
-NAME = "gearsim_io"
-MESSAGES = Path(__file__).resolve().parent.parent / "gearsim_msgs" / "msg"
+HERE = Path(__file__).resolve().parent
+ABOUT = ElementTree.parse(HERE / "package.xml").getroot()
+NAME = ABOUT.findtext("name")
+VERSION = ABOUT.findtext("version")
+MESSAGES = HERE.parent / "gearsim_msgs" / "msg"
 
 
 class BuildWithMessages(build_py):
@@ -20,12 +26,12 @@ class BuildWithMessages(build_py):
 
 setup(
     name=NAME,
-    version="0.1.0",
-    description="Signals, records, bags, importers and rerun export of the gearsim test rig.",
-    license="Apache-2.0",
-    author="gearsim maintainers",
-    maintainer="gearsim maintainers",
-    maintainer_email="maintainers@example.com",
+    version=VERSION,
+    description=ABOUT.findtext("description"),
+    license=ABOUT.findtext("license"),
+    author=ABOUT.findtext("maintainer"),
+    maintainer=ABOUT.findtext("maintainer"),
+    maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
     package_data={NAME: ["machines/*.yaml"]},
@@ -33,7 +39,20 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["setuptools"],
+    # What runs without ROS; rclpy and the messages come with ROS, see package.xml.
+    install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        "pydantic>=2",
+        "pint>=0.24",
+        "ruamel.yaml>=0.18",
+        "mcap>=1.2",
+        "rosbags>=0.10",
+        "rerun-sdk>=0.41,<0.42",
+        "h5py>=3.10",
+        "pyuff>=2.4",
+        "soundfile>=0.12",
+    ],
     zip_safe=False,
     cmdclass={"build_py": BuildWithMessages},
     entry_points={
