@@ -1,5 +1,7 @@
 """The accelerometer chain against scipy's filters, closed forms and simple counting."""
 
+import itertools
+
 import numpy as np
 import pytest
 from gearsim_io.errors import InputError
@@ -22,9 +24,8 @@ def _chain(*rows, rate=RATE, seed=1, sites=("a", "b")):
 def _run(chain, motion, cuts=()):
     """All samples of `motion` that have the context which the chain needs, in pieces ending at `cuts`."""
     total = motion.shape[1] - chain.past - chain.ahead
-    edges = [0, *cuts, total]
     pieces = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in itertools.pairwise([0, *cuts, total]):
         window = motion[:, start : stop + chain.past + chain.ahead]
         pieces.append(chain.process(window, start, stop - start))
     return np.concatenate(pieces, axis=1)

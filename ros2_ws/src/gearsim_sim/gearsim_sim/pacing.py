@@ -27,7 +27,7 @@ class PaceReport:
     slipped_s : float
         Simulated seconds by which the schedule was put back because the machine could not keep up.
     keeping_up : bool
-        False while the lag is more than `late_s` or the schedule was put back within the last two seconds.
+        False while samples are late by more than `late_s` or the schedule was put back within the last two seconds.
     """
 
     lag_s: float
@@ -42,9 +42,9 @@ class Pacer:
 
     The schedule is a straight line: at `factor` times real time, sample n is due at start + n / (rate x
     factor). After a stall the number due is therefore as exact as the clock, and the samples missed are
-    made at once. If more than `max_lag_s` of simulated time are due, the machine cannot keep up: the
-    schedule is put back so that just `max_lag_s` remain due. Simulated time then falls behind; no sample is
-    ever left out or added.
+    made at once. If samples are overdue by more than `max_lag_s`, the machine cannot keep up: the schedule
+    is put back so that just `max_lag_s` remain. Simulated time then falls behind; no sample is ever left
+    out or added.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class Pacer:
     factor : float
         Simulated seconds per second of the clock; 0 is as fast as it goes.
     max_lag_s : float
-        Simulated seconds that may be due before the schedule is put back.
+        Seconds of the clock by which samples may be late before the schedule is put back.
     late_s : float
-        Lag above which the report says that the machine does not keep up.
+        The same, above which the report says that the machine does not keep up.
     """
 
     def __init__(self, rate_hz: float, factor: float = 1.0, max_lag_s: float = 2.0, late_s: float = 0.5):
@@ -63,8 +63,8 @@ class Pacer:
             raise ValueError(f"rate factor {factor}: expected a finite number >= 0")
         self._rate_hz = rate_hz
         self._factor = factor
-        self._max_lag = round(max_lag_s * rate_hz)
-        self._late = late_s * rate_hz
+        self._max_lag_s = max_lag_s
+        self._late_s = late_s
         self._made = 0
         self._anchor_s: float | None = None
         self._anchor_samples = 0.0
@@ -101,9 +101,10 @@ class Pacer:
         if self._factor == 0:
             return most
         behind = self._target(now_s) - self._made
-        if behind > self._max_lag:
-            self._slip(behind - self._max_lag, now_s)
-            behind = self._max_lag
+        most_behind = round(self._max_lag_s * self._rate_hz * self._factor)
+        if behind > most_behind:
+            self._slip(behind - most_behind, now_s)
+            behind = most_behind
         return max(0, min(behind, most))
 
     def add(self, samples: int, now_s: float) -> None:
@@ -159,7 +160,7 @@ class Pacer:
             achieved=achieved,
             wanted=self._factor,
             slipped_s=self._slipped / self._rate_hz,
-            keeping_up=lag <= self._late and not slipping,
+            keeping_up=lag <= self._late_s * self._rate_hz * self._factor and not slipping,
         )
 
     def _target(self, now_s: float) -> int:
