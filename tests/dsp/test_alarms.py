@@ -161,6 +161,16 @@ def test_an_alarm_moves_to_another_bearing_only_when_all_recent_windows_say_so()
     assert [a.component for a in alarms.state().active] == ["bearing_4"]
 
 
+def test_a_sign_too_weak_in_size_keeps_an_alarm_but_raises_none():
+    weak = (replace(sign(40), may_raise=False, component=""),)
+    assert not any(feed(book(), [weak] * 20))
+    alarms = book()
+    assert levels(feed(alarms, [20, 20])) == [[], [("OK", "ERROR")]]
+    assert not any(feed(alarms, [weak] * 20, start=2))
+    assert [a.component for a in alarms.state().active] == ["bearing_3"]
+    assert levels(feed(alarms, [1] * 8, start=22))[-1] == [("ERROR", "OK")]
+
+
 def test_two_faults_have_two_alarms():
     row = (sign(9), sign(20, fault="inner_race"))
     flat = [a for step in feed(book(), [row] * 3) for a in step]

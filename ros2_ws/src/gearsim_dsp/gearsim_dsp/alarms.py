@@ -100,6 +100,8 @@ class Indication:
         That the statement is right, 0 to 1.
     words : str
         For people: "outer race of bearing_3: 48.9 Hz and 5 harmonics, 21 dB over the floor".
+    may_raise : bool
+        False for a sign that is too weak in size to raise a level but keeps one that was raised before.
     """
 
     component: str
@@ -112,6 +114,7 @@ class Indication:
     found_frequency_hz: float = float("nan")
     confidence: float = 0.0
     words: str = ""
+    may_raise: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +207,7 @@ class AlarmBook:
     def _next_level(self, slot: _Slot) -> Level:
         limits, settings = self.thresholds, self.settings
         last = list(slot.recent)
-        recent = [_significance(i) for i in last[-settings.of_windows :]]
+        recent = [_significance(i) for i in last[-settings.of_windows :] if i is None or i.may_raise]
 
         def reached(limit: float) -> bool:
             return sum(s >= limit for s in recent) >= settings.raise_windows
@@ -226,7 +229,8 @@ class AlarmBook:
 
     def _reattribute(self, slot: _Slot) -> list[Alarm]:
         """Move an alarm to another member of its group when all recent windows agree on that one."""
-        named = [i.component for i in slot.recent if i is not None and i.significance >= self.thresholds.warn]
+        signs = [i for i in slot.recent if i is not None and i.may_raise]
+        named = [i.component for i in signs if i.significance >= self.thresholds.warn]
         if len(named) < self.settings.clear_windows or set(named) & {slot.component}:
             return []
         if len(set(named)) != 1:
@@ -278,7 +282,7 @@ class AlarmBook:
 
     def _deciding(self, slot: _Slot) -> Indication | None:
         """The strongest of the windows that count for raising, of the component that is named."""
-        recent = [i for i in list(slot.recent)[-self.settings.of_windows :] if i is not None]
+        recent = [i for i in list(slot.recent)[-self.settings.of_windows :] if i is not None and i.may_raise]
         named = [i for i in recent if i.component == (slot.component or _best_component(slot))] or recent
         return max(named, key=lambda i: i.significance, default=None)
 
@@ -310,6 +314,6 @@ def _best_component(slot: _Slot) -> str:
     """The member of the group with the greatest sum of significances over the recent windows."""
     sums: dict[str, float] = {}
     for indication in slot.recent:
-        if indication is not None:
+        if indication is not None and indication.may_raise:
             sums[indication.component] = sums.get(indication.component, 0.0) + indication.significance
     return max(sorted(sums), key=lambda name: sums[name], default="")

@@ -128,7 +128,7 @@ class FamilySearch:
         scores = score_combs(self._tail, self._usable, grid)
         row, best = np.unravel_index(int(np.argmax(scores.score)), scores.score.shape)
         trials = scores.score.shape[0] * self._independent_orders(family, half_width)
-        p = search_false_alarm(float(np.exp(-scores.score[row, best])), trials * self._looks)
+        p = search_false_alarm(min(1.0, float(np.exp(-scores.score[row, best]))), trials * self._looks)
         modulation = self._modulation(grid, int(best))
         band = self._band(scores.score[:, best], modulation, trials)
         found = self._refined(grid, int(best), int(row))

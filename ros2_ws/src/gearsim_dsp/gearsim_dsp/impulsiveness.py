@@ -62,7 +62,8 @@ def impulsiveness(
     -----
     The jackknife over blocks measures how far K comes from all of the window: a single knock has a large K
     and an equally large error, a train of impacts has a small one. The statistic is held against Student's t
-    with blocks - 1 degrees of freedom; the blocks' values are skewed to the right, so it errs on the safe side.
+    with blocks - 1 degrees of freedom; as the blocks' values are skewed to the right, it errs on the safe
+    side.
     """
     bands, count = squared_envelope.shape
     width = count // max(blocks, 1)

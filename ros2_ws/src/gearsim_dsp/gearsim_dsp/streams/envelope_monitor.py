@@ -1,0 +1,292 @@
+"""Envelope analysis of a stream: every window judged, on all channels, for all bearing faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
+
+from gearsim_dsp.alarms import Indication
+from gearsim_dsp.bands import Band
+from gearsim_dsp.decide import MODULATION_LIMIT, Finding, Verdict, find_faults
+from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.families import FamilyEvidence
+from gearsim_dsp.kinematics import fault_families
+from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker
+from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
+from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
+from gearsim_dsp.streams.report import Report
+from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
+
+__all__ = ["EnvelopeMonitor", "EnvelopeSettings", "group_of", "significance"]
+
+_LEAST_P = 1e-300
+_KEEPS = 0.5
+_MARKED_HARMONICS = 5
+_CLEAR_DB = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class EnvelopeSettings:
+    """Settings of the envelope monitor.
+
+    Parameters
+    ----------
+    window : WindowSettings
+    band_hz : tuple of float, optional
+        Band to demodulate beside the bank that covers the spectrum; None: the bank alone.
+    memory_windows : int
+        Windows that are averaged for a judgement; 1 judges every window by itself.
+    """
+
+    window: WindowSettings = field(default_factory=WindowSettings)
+    band_hz: tuple[float, float] | None = None
+    memory_windows: int = 1
+
+    def __post_init__(self) -> None:
+        if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
+            raise InputError(
+                "envelope settings", "band_hz", self.band_hz, "low and high with 0 <= low < high"
+            )
+        if not 1 <= self.memory_windows <= 1000:
+            raise InputError("envelope settings", "memory_windows", self.memory_windows, "1 to 1000")
+
+
+class EnvelopeMonitor:
+    """Judges each window of a stream by the squared envelope spectra of all channels.
+
+    Parameters
+    ----------
+    machine : Machine
+        Nameplate; its bearings give the fault families looked for.
+    settings : EnvelopeSettings
+    source : str
+        Name in what is published.
+
+    Raises
+    ------
+    InputError
+        When the nameplate's geometry is impossible.
+    """
+
+    def __init__(
+        self, machine: Machine, settings: EnvelopeSettings | None = None, source: str = "envelope"
+    ) -> None:
+        self.machine = machine
+        self.settings = settings or EnvelopeSettings()
+        self.source = source
+        self.assembler = WindowAssembler(machine, self.settings.window)
+        self._pool = EvidencePool(machine, self.settings.memory_windows)
+        find_faults(machine, self._pool)  # an impossible nameplate is told now, not at the first window
+        self._families = fault_families(machine)
+        self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
+        self._run = 0
+
+    def push(self, batch: Batch) -> list[Report]:
+        """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
+        return [self._report(window) for window in self.assembler.push(batch)]
+
+    def finish(self) -> list[Report]:
+        """The end of the input: reports of the windows that still waited for something."""
+        return [self._report(window) for window in self.assembler.finish()]
+
+    def _report(self, window: Window) -> Report:
+        if window.run != self._run:
+            self._pool.reset()
+            self._run = window.run
+        length, rate_hz = window.sample_count, window.sample_rate_hz
+        speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+        results = [self._analyse(window, row, speed) for row in range(len(window.channels))]
+        self._pool.add(results)
+        verdict = find_faults(self.machine, self._pool)
+        quality = tuple(issue for result in results for issue in result.quality)
+        judged = any(result.spectra for result in results)
+        return Report(
+            run=window.run,
+            first_sample=window.first_sample,
+            end_sample=window.end_sample,
+            last_ns=window.last_ns,
+            frame_id=self.machine.name,
+            features=tuple(self._features(window, result, verdict) for result in results if result.spectra),
+            spectra=tuple(self._spectrum(window, result, verdict) for result in results if result.spectra),
+            indications=_indications(verdict) if judged else (),
+            tests=1,
+            judged=judged,
+            note="" if judged else self._why_not(quality, speed),
+            quality=quality,
+            results=tuple(results),
+        )
+
+    def _analyse(self, window: Window, row: int, speed: ShaftSpeed) -> WindowResult:
+        bands = () if self.settings.band_hz is None else (Band(*self.settings.band_hz, "given"),)
+        return analyse_window(
+            WindowInput(
+                samples=window.data[row],
+                sample_rate_hz=window.sample_rate_hz,
+                channel=window.channels[row],
+                first_sample=window.first_sample,
+                speed=speed,
+                machine=self.machine,
+                bands=bands,
+            )
+        )
+
+    def _why_not(self, quality: tuple[QualityIssue, ...], speed: ShaftSpeed) -> str:
+        fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
+        if fatal:
+            return "; ".join(fatal[:3])
+        if not self.machine.bearings:
+            return "the nameplate lists no bearings: no fault can be looked for"
+        if not math.isfinite(speed.value_hz):
+            return "the speed is not known: no tacho and no nominal speed on the nameplate"
+        return "no envelope spectrum could be made"
+
+    def _features(self, window: Window, result: WindowResult, verdict: Verdict) -> Features:
+        band = self._shown(result, verdict)
+        values = [
+            FeatureValue("band_kurtosis", "", band.kurtosis, "1"),
+            FeatureValue("band_rms", "", math.sqrt(max(band.level, 0.0)), window.unit),
+        ]
+        for evidence in _of_channel(verdict, result.channel):
+            stem = evidence.family.label.lower()
+            names = self._members(evidence)
+            values.append(FeatureValue(f"{stem}_snr", names, evidence.snr_db, "dB"))
+            values.append(FeatureValue(f"{stem}_modulation", names, evidence.modulation, "1"))
+            values.append(FeatureValue(f"{stem}_significance", names, significance(evidence), "-log10 P"))
+        return Features(
+            t0_ns=window.t0_ns,
+            frame_id=self.machine.name,
+            source=self.source,
+            channel=result.channel,
+            first_sample=window.first_sample,
+            sample_count=window.sample_count,
+            sample_rate_hz=window.sample_rate_hz,
+            band_low_hz=band.band.low_hz,
+            band_high_hz=band.band.high_hz,
+            speed_hz=verdict.speed.value_hz,
+            speed_source=verdict.speed.source,
+            values=tuple(values),
+        )
+
+    def _spectrum(self, window: Window, result: WindowResult, verdict: Verdict) -> Spectrum:
+        band = self._shown(result, verdict)
+        markers = [self._marker(e) for e in _of_channel(verdict, result.channel)]
+        return Spectrum(
+            t0_ns=window.t0_ns,
+            frame_id=self.machine.name,
+            source=self.source,
+            channel=result.channel,
+            kind="squared_envelope",
+            first_sample=window.first_sample,
+            sample_count=window.sample_count,
+            sample_rate_hz=window.sample_rate_hz,
+            band_low_hz=band.band.low_hz,
+            band_high_hz=band.band.high_hz,
+            speed_hz=result.axis_speed_hz,
+            axis_unit="order",
+            axis_start=0.0,
+            axis_step=band.order_step,
+            value_unit="1",
+            values=np.asarray(band.power, dtype=np.float32),
+            markers=tuple(markers),
+        )
+
+    def _marker(self, evidence: FamilyEvidence) -> SpectrumMarker:
+        """At the order found where the family shows, else at the order expected."""
+        shows = evidence.snr_db >= _CLEAR_DB and math.isfinite(evidence.found_order)
+        return SpectrumMarker(
+            label=evidence.family.label,
+            component=self._members(evidence),
+            position=evidence.found_order if shows else evidence.family.order,
+            harmonics=_MARKED_HARMONICS,
+            sideband_spacing=evidence.family.sideband_order,
+            snr_db=evidence.snr_db,
+        )
+
+    def _members(self, evidence: FamilyEvidence) -> str:
+        """Names of the bearings that this family may come from on the channel: the nearest, else all."""
+        wanted = group_of(evidence.family.fault, evidence.family.order)
+        like = [f.component for f in self._families if group_of(f.fault, f.order) == wanted]
+        near = [c for c in like if evidence.channel in self.machine.bearing(c).channels]
+        return ", ".join(near or like)
+
+    def _shown(self, result: WindowResult, verdict: Verdict) -> BandSpectrum:
+        """The band worth a look: given, else that of a finding on this channel, else the most impulsive."""
+        if self.settings.band_hz is not None:
+            return result.spectra[-1]
+        for finding in verdict.findings:
+            if finding.channel == result.channel:
+                wanted = finding.evidence.get("band_hz")
+                for spectrum in result.spectra:
+                    if [spectrum.band.low_hz, spectrum.band.high_hz] == wanted:
+                        return spectrum
+        return max(result.spectra, key=lambda s: s.kurtosis)
+
+
+def group_of(fault: str, order: float) -> str:
+    """Name of the group of faults that have the same lines."""
+    return f"{fault}@{order:.4f}"
+
+
+def significance(evidence: FamilyEvidence) -> float:
+    """-log10 of the probability that noise shows as much in this window, 300 at most."""
+    return -math.log10(max(evidence.false_alarm_probability, _LEAST_P))
+
+
+def _of_channel(verdict: Verdict, channel: str) -> Iterable[FamilyEvidence]:
+    return (evidence for evidence in verdict.by_channel if evidence.channel == channel)
+
+
+def _indications(verdict: Verdict) -> tuple[Indication, ...]:
+    """Findings, and what is no finding (any more) but still half as large as one must be."""
+    found = {group_of(f.fault, f.expected_order): _sign(f) for f in verdict.findings}
+    for evidence in verdict.evidence:
+        group = group_of(evidence.family.fault, evidence.family.order)
+        if group not in found and evidence.modulation >= _KEEPS * MODULATION_LIMIT:
+            found[group] = _trace(group, evidence)
+    return tuple(found[group] for group in sorted(found))
+
+
+def _sign(finding: Finding) -> Indication:
+    p = finding.evidence["false_alarm_probability"]
+    assert isinstance(p, float)
+    return Indication(
+        component=finding.component,
+        fault=finding.fault,
+        group=group_of(finding.fault, finding.expected_order),
+        channel=finding.channel,
+        significance=-math.log10(max(p, _LEAST_P)),
+        expected_order=finding.expected_order,
+        found_order=finding.found_order,
+        found_frequency_hz=finding.found_hz,
+        confidence=finding.confidence,
+        words=_words(finding),
+    )
+
+
+def _trace(group: str, evidence: FamilyEvidence) -> Indication:
+    return Indication(
+        component="",
+        fault=evidence.family.fault,
+        group=group,
+        channel=evidence.channel,
+        significance=significance(evidence),
+        expected_order=evidence.family.order,
+        found_order=evidence.found_order,
+        found_frequency_hz=evidence.found_hz,
+        may_raise=False,
+    )
+
+
+def _words(finding: Finding) -> str:
+    levels = finding.evidence["harmonic_snr_db"]
+    assert isinstance(levels, list)
+    more = sum(level >= _CLEAR_DB for level in levels[1:])
+    harmonics = f" and {more} harmonic{'s' if more > 1 else ''}" if more else ""
+    what = f"{finding.fault.replace('_', ' ')} of {finding.component}"
+    return f"{what}: {finding.found_hz:.1f} Hz{harmonics}, {finding.snr_db:.0f} dB over the floor"
