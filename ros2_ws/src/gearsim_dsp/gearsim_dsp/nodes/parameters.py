@@ -32,6 +32,11 @@ class MonitorParameters:
     patience_s: float = parameter(3.0, "wait for machine_info before complaining [s]", 0.0, 3600.0)
     queue_s: float = parameter(10.0, "signal that may wait for analysis [s]", 0.5, 120.0)
 
+    def check(self) -> None:
+        """Raise InputError where values contradict each other, so that it is told at the start."""
+        self.window_settings()
+        self.alarm_settings()
+
     def window_settings(self) -> WindowSettings:
         """The part for the assembler."""
         return WindowSettings(self.window_s, self.hop_s, self.angle_wait_s)

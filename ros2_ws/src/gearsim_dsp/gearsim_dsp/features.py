@@ -1,0 +1,39 @@
+"""Scalar condition indicators of a signal. All are of the signal without its mean."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from gearsim_io.errors import InputError
+from numpy.typing import NDArray
+
+__all__ = ["crest_factor", "kurtosis", "rms"]
+
+Samples = NDArray[np.float32] | NDArray[np.float64]
+
+
+def rms(samples: Samples) -> float:
+    """Root mean square, in the signal's unit."""
+    return math.sqrt(float(np.mean(_centred(samples) ** 2)))
+
+
+def kurtosis(samples: Samples) -> float:
+    """Fourth moment over the squared second: 3 for Gaussian noise, 1.5 for a sine; NaN for a constant."""
+    square = _centred(samples) ** 2
+    second = float(np.mean(square))
+    return float(np.mean(square**2)) / second**2 if second > 0 else float("nan")
+
+
+def crest_factor(samples: Samples) -> float:
+    """Largest magnitude over the RMS: the square root of 2 for a sine; NaN for a constant."""
+    x = _centred(samples)
+    effective = math.sqrt(float(np.mean(x**2)))
+    return float(np.max(np.abs(x))) / effective if effective > 0 else float("nan")
+
+
+def _centred(samples: Samples) -> NDArray[np.float64]:
+    x = np.asarray(samples, dtype=np.float64)
+    if x.ndim != 1 or x.size == 0:
+        raise InputError("features", "samples", f"shape {x.shape}", "a vector of samples")
+    return np.asarray(x - np.mean(x))
