@@ -84,6 +84,13 @@ timeline:
     assert (machine.tacho_shafts, machine.encoder_shafts) == (("output",), ("input",))
 
 
+def test_keys_can_be_replaced():
+    scenario = load_scenario("quick", {"seed": 9, "batch_samples": 64})
+    assert (scenario.name, scenario.seed, scenario.batch_samples) == ("quick", 9, 64)
+    with pytest.raises(InputError, match="quick.yaml: seed: got -1"):
+        load_scenario("quick", {"seed": -1})
+
+
 def test_event_times_become_the_nearest_sample(tmp_path):
     scenario = _load(tmp_path, "sample_rate: 48 kHz\ntimeline:\n  - {at: 0.1 s, clear: {}}\n")
     assert scenario.events[0].at_sample == 4800
@@ -106,6 +113,15 @@ BAD = [
     ("batch_samples: 60000", "batch_samples: got 60000, expected at most 15000, so that a message of 8"),
     ("batch_samples: many", "batch_samples: got many, expected "),
     ("rate_factor: -2", "rate_factor: got -2, expected a number without unit, >= 0"),
+    ("faults: [{kind: x, component: y}]", "faults.0: kind: got x, expected one of inner_race_spall, "),
+    (
+        "faults: [{kind: outer_race_spall, component: bearing_1, params: {width: 1 mm}}]",
+        "faults.0: width: got 1 mm, expected no such key; one of depth_m, position_rad, row, width_m",
+    ),
+    (
+        "timeline: [{at: 1 s, inject: {kind: outer_race_spall, component: b, params: {width_m: 1 V}}}]",
+        "timeline.0.inject: width_m: got 1 V, expected a number in m, > 0 (not V)",
+    ),
     ("faults: [{kind: x}]", "faults.0.component: got nothing, expected this key"),
     ("faults: [{kind: x, component: y, size: 3}]", "faults.0.size: got 3, expected no such key"),
     ("faults: [{kind: x, component: y, severity: 3}]", "faults.0.severity: got 3, expected"),

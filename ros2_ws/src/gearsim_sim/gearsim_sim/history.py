@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from gearsim_sim.events import Clear, Event, Inject, SetOperatingPoint
 from gearsim_sim.scenario import Scenario
-from gearsim_sim.truth import FaultTruth, GroundTruth, version
+from gearsim_sim.truth import FaultTruth, GroundTruth, fault_parameters, version
 
 
 class History:
@@ -90,8 +90,7 @@ def _sample(event: Event) -> int:
 
 def _fault(event: Inject) -> FaultTruth:
     fault = event.fault
-    parameters = {**fault.params, "severity": fault.severity}
-    return FaultTruth(fault.name, fault.kind, fault.component, parameters, _sample(event))
+    return FaultTruth(fault.name, fault.kind, fault.component, fault_parameters(fault), _sample(event))
 
 
 def _drop_ended(running: dict[str, FaultTruth], ends: dict[str, int], sample: int) -> None:

@@ -50,8 +50,9 @@ class RunningModel(Protocol):
 
 
 def _lpm34(scenario: Scenario) -> RunningModel:
+    params = load_parallel_params(scenario.machine_path, scenario.parameters, scenario.source)
     return Engine(
-        load_parallel_params(scenario.machine_path),
+        params,
         scenario.seed,
         scenario.sample_rate_hz,
         scenario.oversampling,

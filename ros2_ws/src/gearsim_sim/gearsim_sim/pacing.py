@@ -27,7 +27,8 @@ class PaceReport:
     slipped_s : float
         Simulated seconds by which the schedule was put back because the machine could not keep up.
     keeping_up : bool
-        False while samples are late by more than `late_s` or the schedule was put back within the last two seconds.
+        False while samples are late by more than `late_s`, and for two seconds after the schedule was put
+        back.
     """
 
     lag_s: float

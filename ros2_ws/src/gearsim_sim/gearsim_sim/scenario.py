@@ -22,6 +22,7 @@ from pydantic import Field, model_validator
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.models import MODELS
 from gearsim_sim.sensors.rows import SensorsModel, SensorTable, sensor_table
+from gearsim_sim.truth import fault_parameters
 
 FOLDER = Path(__file__).parent / "scenarios"
 # Fast DDS passes messages through shared memory only up to its segment size; larger ones are lost under load.
@@ -180,8 +181,15 @@ def scenario_file(name_or_path: str | Path) -> Path:
     raise InputError("scenario", "", text, f"one of {known}, or the path of a .yaml file")
 
 
-def load_scenario(name_or_path: str | Path) -> Scenario:
+def load_scenario(name_or_path: str | Path, changes: Mapping[str, Any] | None = None) -> Scenario:
     """The scenario of that name or file.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A shipped name (see `scenario_names`) or the path of a YAML file.
+    changes : mapping, optional
+        Top-level keys that replace those of the file, such as `{"seed": 2}`.
 
     Raises
     ------
@@ -189,7 +197,10 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         Naming file, key, what was found and what is expected.
     """
     path = scenario_file(name_or_path)
-    return parse_scenario(read_yaml(path), path)
+    content = read_yaml(path)
+    if changes and isinstance(content, dict):
+        content = {**content, **changes}
+    return parse_scenario(content, path)
 
 
 def parse_scenario(content: Any, path: Path) -> Scenario:
@@ -204,7 +215,12 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
     machine = load_machine(machine_path)
     table = sensor_table(model.sensors, machine, where)
     _check_batch(model.batch_samples, len(table.accelerometers), where)
-    events = tuple(event.event(model.sample_rate) for event in model.timeline)
+    faults = tuple(_fault(fault, f"{where}: faults.{k}") for k, fault in enumerate(model.faults))
+    events = []
+    for number, event in enumerate(model.timeline):
+        if event.inject is not None:
+            _fault(event.inject, f"{where}: timeline.{number}.inject")
+        events.append(event.event(model.sample_rate))
     return Scenario(
         name=path.stem,
         description=model.description,
@@ -221,9 +237,18 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
         load_nm=model.operating_point.load,
         sensors=table,
         parameters=model.parameters,
-        faults=tuple(fault.spec() for fault in model.faults),
+        faults=faults,
         events=(),
     ).with_events(events)
+
+
+def _fault(fault: FaultModel, where: str) -> FaultSpec:
+    spec = fault.spec()
+    try:
+        fault_parameters(spec)
+    except InputError as error:
+        raise InputError(where, error.field, error.value, error.expected) from None
+    return spec
 
 
 def _machine_path(name: str, scenario_path: Path) -> Path:

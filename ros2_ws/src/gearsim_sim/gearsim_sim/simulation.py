@@ -47,7 +47,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, t0_ns: int = 0, model: RunningModel | None = None) -> None:
         self.scenario = scenario
         self.t0_ns = t0_ns
-        self._model = MODELS[scenario.model](scenario) if model is None else model
+        self._model = _model_of(scenario) if model is None else model
         self._history = History(scenario)
         for number, event in enumerate(scenario.events):
             try:
@@ -175,6 +175,17 @@ class Simulation:
         window.drop(count)
         self._sent += count
         return batches
+
+
+def _model_of(scenario: Scenario) -> RunningModel:
+    try:
+        return MODELS[scenario.model](scenario)
+    except InputError as error:
+        if scenario.source in error.where:
+            raise
+        raise InputError(
+            f"{scenario.source}: {error.where}", error.field, error.value, error.expected
+        ) from None
 
 
 def simulate(

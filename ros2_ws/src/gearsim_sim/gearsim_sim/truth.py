@@ -12,8 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from gearsim_io.quantities import validate
+
 from gearsim_sim import __version__
-from gearsim_sim.events import Event
+from gearsim_sim.events import Event, FaultSpec
+from gearsim_sim.model.faults import fault_kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,19 @@ class GroundTruth:
     version: str
     frame_id: str = ""
     events: tuple[Event, ...] = ()
+
+
+def fault_parameters(spec: FaultSpec) -> dict[str, Any]:
+    """All parameters of a fault, defaults included, as SI numbers with the unit in the key.
+
+    Raises
+    ------
+    InputError
+        An unknown kind, an unknown parameter, or a value that is out of range or has the wrong unit.
+    """
+    model = fault_kind(spec.kind).params_model
+    checked = validate(model, spec.params, f"fault {spec.name}")
+    return {**checked.model_dump(exclude_none=True), "severity": spec.severity}
 
 
 @cache

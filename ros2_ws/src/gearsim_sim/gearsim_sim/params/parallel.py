@@ -7,8 +7,9 @@ so that they have one home.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
@@ -17,6 +18,7 @@ from gearsim_io.quantities import Si, validate
 from pydantic import Field
 
 from gearsim_sim.params.fields import Count, Fraction, Strict
+from gearsim_sim.params.overrides import override
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
 MODEL_KIND = "parallel_shaft"
@@ -162,13 +164,19 @@ class ParallelParams(Strict):
         return self.model_copy(update={"physics": self.physics.model_copy(update=switches)})
 
 
-def load_parallel_params(machine: str | Path = "unsw_parallel") -> ParallelParams:
+def load_parallel_params(
+    machine: str | Path = "unsw_parallel", overrides: Mapping[str, Any] | None = None, source: str = ""
+) -> ParallelParams:
     """Parameters of a parallel-shaft machine.
 
     Parameters
     ----------
     machine : str or Path
         Name of a shipped machine description or path of a YAML file.
+    overrides : mapping, optional
+        Dotted names of the `model` section and the numbers that replace it (see `override`).
+    source : str
+        Where the overrides come from, for errors.
 
     Raises
     ------
@@ -183,6 +191,9 @@ def load_parallel_params(machine: str | Path = "unsw_parallel") -> ParallelParam
     if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
         found = section.get("kind") if isinstance(section, dict) else section
         raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine unsw_parallel has it")
+    if overrides:
+        section = override(section, overrides, source or where)
+        where = f"{source or where} (parameters, with {path})"
     model = validate(ParallelModel, section, where, require_source=True)
     mesh = _single_mesh(where, plate)
     params = ParallelParams(
