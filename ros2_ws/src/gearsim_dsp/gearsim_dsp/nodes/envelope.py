@@ -15,6 +15,7 @@ from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettin
 from gearsim_dsp.streams.report import AlarmedMonitor
 
 SOURCE = "envelope"
+_DEFAULT = EnvelopeSettings()
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,10 @@ class EnvelopeParameters(MonitorParameters):
 
     band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
     band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
-    memory_windows: int = parameter(1, "windows averaged for a judgement", 1, 1000)
+    memory_windows: int = parameter(0, "windows averaged for a judgement; 0: automatic", 0, 1000)
+    kurtogram_every: int = parameter(
+        _DEFAULT.kurtogram_every, "windows from one choice of a band to the next; 0: none", 0, 1000
+    )
 
     def check(self) -> None:
         """Raise InputError where values contradict each other."""
@@ -34,7 +38,7 @@ class EnvelopeParameters(MonitorParameters):
         """The part for the monitor."""
         automatic = self.band_low_hz == 0 and self.band_high_hz == 0
         band = None if automatic else (self.band_low_hz, self.band_high_hz)
-        return EnvelopeSettings(self.window_settings(), band, self.memory_windows)
+        return EnvelopeSettings(self.window_settings(), band, self.memory_windows, self.kurtogram_every)
 
 
 def make_monitor(machine: Machine, parameters: EnvelopeParameters) -> AlarmedMonitor:

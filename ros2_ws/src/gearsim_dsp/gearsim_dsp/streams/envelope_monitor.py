@@ -20,6 +20,7 @@ from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker
 from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
 from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
+from gearsim_dsp.streams.band_keeper import BandKeeper
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
 
@@ -29,6 +30,7 @@ _LEAST_P = 1e-300
 _KEEPS = 0.5
 _MARKED_HARMONICS = 5
 _CLEAR_DB = 6.0
+_MEMORY_WITHOUT_ANGLE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +41,28 @@ class EnvelopeSettings:
     ----------
     window : WindowSettings
     band_hz : tuple of float, optional
-        Band to demodulate beside the bank that covers the spectrum; None: the bank alone.
+        Band to demodulate beside the bank that covers the spectrum; None: the kurtogram chooses one for each
+        channel.
     memory_windows : int
-        Windows that are averaged for a judgement; 1 judges every window by itself.
+        Windows that are averaged for a judgement; 1 judges every window by itself, 0 leaves it to the
+        machine: 1 where an angle signal is listed, else 4, for the sake of the speed's estimate.
+    kurtogram_every : int
+        Windows from one choice of a band to the next (of another channel); 0: no kurtogram.
     """
 
     window: WindowSettings = field(default_factory=WindowSettings)
     band_hz: tuple[float, float] | None = None
-    memory_windows: int = 1
+    memory_windows: int = 0
+    kurtogram_every: int = 4
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
             raise InputError(
                 "envelope settings", "band_hz", self.band_hz, "low and high with 0 <= low < high"
             )
-        if not 1 <= self.memory_windows <= 1000:
-            raise InputError("envelope settings", "memory_windows", self.memory_windows, "1 to 1000")
+        for name in ("memory_windows", "kurtogram_every"):
+            if not 0 <= getattr(self, name) <= 1000:
+                raise InputError("envelope settings", name, getattr(self, name), "0 to 1000")
 
 
 class EnvelopeMonitor:
@@ -81,7 +89,11 @@ class EnvelopeMonitor:
         self.settings = settings or EnvelopeSettings()
         self.source = source
         self.assembler = WindowAssembler(machine, self.settings.window)
-        self._pool = EvidencePool(machine, self.settings.memory_windows)
+        angle = bool(machine.tacho_shafts or machine.encoder_shafts)
+        memory = self.settings.memory_windows or (1 if angle else _MEMORY_WITHOUT_ANGLE)
+        self._pool = EvidencePool(machine, memory)
+        every = self.settings.kurtogram_every if self.settings.band_hz is None else 0
+        self._keeper = BandKeeper(machine, every, self.settings.window.hop_s)
         find_faults(machine, self._pool)  # an impossible nameplate is told now, not at the first window
         self._families = fault_families(machine)
         self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
@@ -98,9 +110,11 @@ class EnvelopeMonitor:
     def _report(self, window: Window) -> Report:
         if window.run != self._run:
             self._pool.reset()
+            self._keeper.reset()
             self._run = window.run
         length, rate_hz = window.sample_count, window.sample_rate_hz
         speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+        self._keeper.renew(window, speed.value_hz)
         results = [self._analyse(window, row, speed) for row in range(len(window.channels))]
         self._pool.add(results)
         verdict = find_faults(self.machine, self._pool)
@@ -123,7 +137,8 @@ class EnvelopeMonitor:
         )
 
     def _analyse(self, window: Window, row: int, speed: ShaftSpeed) -> WindowResult:
-        bands = () if self.settings.band_hz is None else (Band(*self.settings.band_hz, "given"),)
+        given = self.settings.band_hz
+        band = self._keeper.band(window.channels[row]) if given is None else Band(*given, "given")
         return analyse_window(
             WindowInput(
                 samples=window.data[row],
@@ -132,7 +147,7 @@ class EnvelopeMonitor:
                 first_sample=window.first_sample,
                 speed=speed,
                 machine=self.machine,
-                bands=bands,
+                bands=() if band is None else (band,),
             )
         )
 
@@ -216,16 +231,17 @@ class EnvelopeMonitor:
         return ", ".join(near or like)
 
     def _shown(self, result: WindowResult, verdict: Verdict) -> BandSpectrum:
-        """The band worth a look: given, else that of a finding on this channel, else the most impulsive."""
+        """The band worth a look: given, that of a finding on the channel, the kurtogram's, most impulsive."""
+        last = result.spectra[-1]
         if self.settings.band_hz is not None:
-            return result.spectra[-1]
+            return last
         for finding in verdict.findings:
             if finding.channel == result.channel:
                 wanted = finding.evidence.get("band_hz")
                 for spectrum in result.spectra:
                     if [spectrum.band.low_hz, spectrum.band.high_hz] == wanted:
                         return spectrum
-        return max(result.spectra, key=lambda s: s.kurtosis)
+        return last if last.band.why == "kurtogram" else max(result.spectra, key=lambda s: s.kurtosis)
 
 
 def group_of(fault: str, order: float) -> str:
