@@ -1,0 +1,275 @@
+"""The diagnosis of a whole record, with the code of the live monitors.
+
+The record goes batch by batch through the envelope and the kurtosis monitor, as a live stream would; what
+they found in the single windows is pooled over the record, and the verdict is that of the pooled
+evidence.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+from gearsim_io.errors import InputError
+from gearsim_io.importers import machine_for
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import Record
+
+from gearsim_dsp.decide import Finding, Verdict, find_faults
+from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
+from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.kinematics import mesh_orders
+from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.speed import ShaftSpeed
+from gearsim_dsp.streams.assembler import WindowSettings
+from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
+from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
+from gearsim_dsp.streams.report import Report
+
+_IMPACT_PROBABILITY = 1e-4
+
+__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose_record"]
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisSettings:
+    """How the record is cut into windows.
+
+    Parameters
+    ----------
+    window_s : float
+        Length of a window; it is made longer where the shaft needs that for `least_turns`, and shorter where
+        the record is.
+    least_turns : float
+        Turns of the reference shaft in a window.
+    batch_samples : int
+        Size of the batches handed to the monitors; it has no influence on the result.
+    """
+
+    window_s: float = 2.0
+    least_turns: float = 20.0
+    batch_samples: int = 8192
+
+    def __post_init__(self) -> None:
+        if not (0.1 <= self.window_s <= 60 and 1 <= self.least_turns <= 1000 and self.batch_samples >= 1):
+            got = (self.window_s, self.least_turns, self.batch_samples)
+            raise InputError(
+                "diagnosis settings", "window_s, least_turns, batch_samples", got, "sensible values"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What is known of a machine after one record."""
+
+    speed: ShaftSpeed
+    quality: tuple[QualityIssue, ...]
+    findings: tuple[Finding, ...]
+    machine: str = ""
+    source: str = ""
+    verdict: Verdict | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def judged(self) -> bool:
+        """False when no channel could be judged for bearing faults."""
+        return self.verdict is not None and bool(self.verdict.evidence)
+
+    @property
+    def healthy(self) -> bool:
+        """True when nothing was found; weak comfort where nothing could be judged."""
+        return not self.findings
+
+    def to_json(self) -> dict[str, object]:
+        """The object of `diagnose --json`."""
+        return {
+            "speed_hz": self.speed.to_json(),
+            "quality": [issue.to_json() for issue in self.quality],
+            "healthy": self.healthy,
+            "findings": [finding.to_json() for finding in self.findings],
+        }
+
+    def lines(self) -> list[str]:
+        """The same for people, line by line."""
+        speed = self.speed
+        lines = []
+        if np.isfinite(speed.value_hz):
+            half = 50 * (speed.ci95_hz[1] - speed.ci95_hz[0]) / speed.value_hz
+            lines.append(f"speed: {speed.value_hz:.3f} Hz +- {half:.2g} % ({speed.source})")
+        else:
+            lines.append("speed: not known")
+        lines += [
+            f"quality: {q.channel + ': ' if q.channel else ''}{q.issue.replace('_', ' ')}: {q.detail}"
+            for q in self.quality
+        ]
+        lines += [_finding_line(finding) for finding in self.findings]
+        if not self.findings:
+            lines.append("no fault found" if self.judged else "no fault found: nothing could be judged")
+        return lines
+
+
+def _finding_line(finding: Finding) -> str:
+    what = f"{finding.fault.replace('_', ' ')} of {finding.component}"
+    return (
+        f"{what}: {finding.found_hz:.2f} Hz (order {finding.found_order:.4f}, expected "
+        f"{finding.expected_order:.4f}), {finding.snr_db:.0f} dB over the floor, {finding.severity}, "
+        f"confidence {finding.confidence:.2f}"
+    )
+
+
+def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSettings | None = None) -> Diagnosis:
+    """Diagnose a record of a machine.
+
+    Parameters
+    ----------
+    record : Record
+    machine : Machine
+        Its nominal speed is replaced by the one that the record's file states, if it does.
+    settings : DiagnosisSettings, optional
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        When the record has none of the machine's channels or the nameplate is impossible.
+    """
+    settings = settings or DiagnosisSettings()
+    plate = machine_for(record, machine)
+    known = {channel.name for channel in plate.channels}
+    if known and not known & set(record.channels):
+        expected = "a channel of the machine: " + ", ".join(sorted(known))
+        raise InputError(record.source or "record", "channels", ", ".join(record.channels), expected)
+    window = _window(record, plate, settings)
+    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window))
+    kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
+    pool = EvidencePool(plate)
+    reports: list[Report] = []
+    impulsive: list[Report] = []
+    for batch in record.batches(settings.batch_samples):
+        reports += _pooled(envelope.push(batch), pool)
+        impulsive += kurtosis.push(batch)
+    reports += _pooled(envelope.finish(), pool)
+    impulsive += kurtosis.finish()
+    verdict = find_faults(plate, pool)
+    quality = _quality(record, plate, verdict, reports, impulsive)
+    return Diagnosis(verdict.speed, tuple(quality), verdict.findings, plate.name, record.source, verdict)
+
+
+def _pooled(reports: list[Report], pool: EvidencePool) -> list[Report]:
+    for report in reports:
+        pool.add(report.results)
+    return reports
+
+
+def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> WindowSettings:
+    """Windows of the length asked for, at most the record's, overlapping by three quarters."""
+    length = settings.window_s
+    if np.isfinite(machine.nominal_speed_hz):
+        length = max(length, settings.least_turns / machine.nominal_speed_hz)
+    length = float(np.clip(length, 0.05, 60.0))
+    if record.seconds < length:
+        length = max(0.05, np.floor(record.sample_count * 0.999) / record.sample_rate_hz)
+    return WindowSettings(window_s=length, hop_s=max(0.01, length / 4), angle_wait_s=0.0)
+
+
+def _quality(
+    record: Record,
+    machine: Machine,
+    verdict: Verdict,
+    reports: list[Report],
+    impulsive: list[Report],
+) -> list[QualityIssue]:
+    issues = _merged(reports)
+    if not reports:
+        detail = f"{record.seconds:.3g} s are too short for one window"
+        issues.append(QualityIssue("too_short", "", detail, True))
+    issues += _about_speed(machine, verdict.speed)
+    if not machine.bearings:
+        detail = "the nameplate lists no bearings: no fault family could be looked for"
+        issues.append(QualityIssue("nothing_to_look_for", "", detail))
+    for row, channel in enumerate(record.channels):
+        if not np.all(np.isfinite(record.data[row])):
+            continue
+        lines = _electrical(record, row, machine, verdict)
+        issues += _line_notes(lines, channel)
+    if not verdict.findings:
+        issues += verdict.notes
+        issues += _impacts(impulsive)
+    return issues
+
+
+def _merged(reports: list[Report]) -> list[QualityIssue]:
+    """One entry for each kind of issue of each channel, with the number of windows."""
+    found: dict[tuple[str, str], list[QualityIssue]] = defaultdict(list)
+    for report in reports:
+        for issue in report.quality:
+            found[issue.issue, issue.channel].append(issue)
+    return [
+        QualityIssue(
+            kind, channel, f"{items[0].detail} (in {len(items)} of {len(reports)} windows)", items[0].fatal
+        )
+        for (kind, channel), items in found.items()
+    ]
+
+
+def _about_speed(machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
+    issues = []
+    nominal, tolerance = machine.nominal_speed_hz, machine.speed_tolerance
+    if not np.isfinite(speed.value_hz):
+        detail = "no tacho, no nominal speed, and no comb of shaft lines in the signal"
+        issues.append(QualityIssue("speed_unknown", "", detail))
+    elif speed.source == "nameplate":
+        reason = f" ({speed.note})" if speed.note else ""
+        detail = f"the nameplate's {nominal:.4g} Hz +- {100 * tolerance:.2g} % is taken{reason}"
+        issues.append(QualityIssue("speed_not_measured", "", detail))
+    elif np.isfinite(nominal) and abs(speed.value_hz / nominal - 1) > tolerance:
+        percent = 100 * (speed.value_hz / nominal - 1)
+        detail = f"{speed.value_hz:.4g} Hz is {percent:+.2g} % off the nameplate's {nominal:.4g} Hz"
+        issues.append(QualityIssue("speed_off_nameplate", "", detail))
+    if speed.source in ("tacho", "encoder") and speed.note:
+        issues.append(QualityIssue(f"{speed.source}_mended", "", speed.note))
+    return issues
+
+
+def _electrical(record: Record, row: int, machine: Machine, verdict: Verdict) -> ElectricalLines:
+    turn = verdict.speed.value_hz
+    lines: list[float] = []
+    if np.isfinite(turn):
+        lines += [turn * shaft.ratio for shaft in machine.shafts]
+        lines += [turn * order for order in mesh_orders(machine).values()]
+    lines += [finding.found_hz for finding in verdict.findings]
+    error = verdict.speed.relative_error if np.isfinite(turn) else 1e-3
+    return find_electrical_lines(
+        record.data[row], record.sample_rate_hz, machine.line_frequency_hz, lines, max(error, 1e-4)
+    )
+
+
+def _line_notes(lines: ElectricalLines, channel: str) -> list[QualityIssue]:
+    notes = []
+    if lines.supply_lines_hz:
+        listed = ", ".join(f"{f:.1f}" for f in lines.supply_lines_hz[:6])
+        detail = f"lines of the {lines.supply_hz:g} Hz supply at {listed} Hz"
+        notes.append(QualityIssue("electrical_lines", channel, detail))
+    if lines.carriers_hz:
+        listed = ", ".join(f"{f:.0f}" for f in lines.carriers_hz)
+        detail = f"narrow lines with their doubles, like an inverter's carrier, at {listed} Hz"
+        notes.append(QualityIssue("inverter_lines", channel, detail))
+    return notes
+
+
+def _impacts(reports: list[Report]) -> list[QualityIssue]:
+    """Impacts in most windows that no fault family explains."""
+    channels: dict[str, int] = defaultdict(int)
+    for report in reports:
+        limit = -np.log10(_IMPACT_PROBABILITY / max(report.tests, 1))
+        for indication in report.indications:
+            if indication.may_raise and indication.significance >= limit:
+                channels[indication.channel] += 1
+    return [
+        QualityIssue("unexplained_impacts", channel, f"impulsive in {count} of {len(reports)} windows")
+        for channel, count in channels.items()
+        if 2 * count > len(reports)
+    ]

@@ -1,0 +1,141 @@
+"""Lines that electricity puts into a vibration signal, named as what they are: supply and inverter.
+
+The supply's lines lie at whole multiples of 50 or 60 Hz, to within the 0.2 % that grids keep. An
+inverter's carrier is a strong, narrow line in the kilohertz range that comes with its double, both
+unrelated to the shafts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft as sfft
+
+from gearsim_dsp.noise_floor import local_floor
+from gearsim_dsp.spectra import good_length
+
+__all__ = ["ElectricalLines", "find_electrical_lines"]
+
+_SUPPLIES_HZ = (50.0, 60.0)
+_SUPPLY_DRIFT = 0.002
+_SUPPLY_DB = 13.0
+_SUPPLY_HARMONICS = 12
+_FEWEST_LINES = 4
+_CARRIER_DB = 30.0
+_DOUBLE_DB = 20.0
+_CARRIER_GRID_HZ = 500.0
+_CARRIER_ERROR = 5e-4
+_LONGEST = 1 << 20
+_BLOCK_LINES = 256
+
+
+@dataclass(frozen=True, slots=True)
+class ElectricalLines:
+    """Lines found, in Hz; `supply_hz` is 0 where no supply shows."""
+
+    supply_hz: float
+    supply_lines_hz: tuple[float, ...]
+    carriers_hz: tuple[float, ...]
+
+
+def find_electrical_lines(
+    samples: NDArray[np.float32] | NDArray[np.float64],
+    sample_rate_hz: float,
+    line_frequency_hz: float = 0.0,
+    machine_lines_hz: Sequence[float] = (),
+    machine_error: float = 1e-3,
+) -> ElectricalLines:
+    """Look for supply and inverter lines.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n,)
+        Finite values; at most the first 2^20 are used. Below two seconds nothing is found.
+    sample_rate_hz : float
+    line_frequency_hz : float
+        Supply of the nameplate, 0: both 50 and 60 Hz are tried.
+    machine_lines_hz : sequence of float
+        Fundamentals of the machine (shafts, meshes, fault lines found); their multiples are not electrical.
+    machine_error : float
+        Relative uncertainty of these.
+    """
+    count = good_length(min(int(samples.size), _LONGEST))
+    if count < 2 * sample_rate_hz:
+        return ElectricalLines(0.0, (), ())
+    x = np.asarray(samples[:count], dtype=np.float64)
+    window = np.hanning(count + 1)[:-1]
+    lines = sfft.rfft((x - x.mean()) * window)
+    power = lines.real**2 + lines.imag**2
+    height_db = 10 * np.log10(np.maximum(power / local_floor(power, _BLOCK_LINES, 1.0, 4), 1e-3))
+    step_hz = sample_rate_hz / count
+    known = _Known([f for f in machine_lines_hz if f > 0], machine_error, step_hz)
+    supplies = (line_frequency_hz,) if line_frequency_hz > 0 else _SUPPLIES_HZ
+    found = [_supply(height_db, step_hz, supply, known) for supply in supplies]
+    best = int(np.argmax([len(lines_hz) for lines_hz in found]))
+    enough = len(found[best]) >= _FEWEST_LINES
+    return ElectricalLines(
+        supplies[best] if enough else 0.0,
+        tuple(found[best]) if enough else (),
+        tuple(_carriers(height_db, step_hz, known)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """Lines of the machine; `explains` is also true where their multiples lie too dense to tell."""
+
+    fundamentals_hz: Sequence[float]
+    error: float
+    step_hz: float
+
+    def explains(self, place_hz: float) -> bool:
+        reach = self.error * place_hz + 1.5 * self.step_hz
+        for fundamental in self.fundamentals_hz:
+            number = round(place_hz / fundamental)
+            if number < 1:
+                continue
+            if abs(place_hz - number * fundamental) < min(reach, 0.25 * fundamental):
+                return True
+        return False
+
+
+def _supply(height_db: NDArray[np.float64], step_hz: float, supply_hz: float, known: _Known) -> list[float]:
+    """Most lines that are multiples of one frequency near the nominal one and belong to no shaft."""
+    peaks = _peaks(height_db, _SUPPLY_DB) * step_hz
+    top = _SUPPLY_HARMONICS * supply_hz * (1 + _SUPPLY_DRIFT)
+    peaks = np.array([p for p in peaks[peaks <= top] if not known.explains(float(p))])
+    best: list[float] = []
+    if peaks.size < _FEWEST_LINES:
+        return best
+    drift = _SUPPLY_DRIFT * supply_hz
+    for trial in np.arange(supply_hz - drift, supply_hz + drift, 0.25 * step_hz / _SUPPLY_HARMONICS):
+        number = np.round(peaks / trial)
+        fits = (number >= 1) & (np.abs(peaks - number * trial) <= 0.75 * step_hz)
+        if np.count_nonzero(fits) > len(best):
+            best = [float(p) for p in peaks[fits]]
+    return best
+
+
+def _peaks(height_db: NDArray[np.float64], least_db: float) -> NDArray[np.float64]:
+    """Positions of local maxima in lines, interpolated by a parabola."""
+    left, mid, right = height_db[:-2], height_db[1:-1], height_db[2:]
+    at = np.flatnonzero((mid > left) & (mid >= right) & (mid >= least_db))
+    curve = np.maximum(2 * mid[at] - left[at] - right[at], 1e-12)
+    return np.asarray(at + 1 + np.clip(0.5 * (right[at] - left[at]) / curve, -0.5, 0.5))
+
+
+def _carriers(height_db: NDArray[np.float64], step_hz: float, known: _Known) -> list[float]:
+    """Strong narrow lines at multiples of 500 Hz that come with their doubles."""
+    found = []
+    for place in _peaks(height_db, _CARRIER_DB) * step_hz:
+        setting = max(3, round(place / _CARRIER_GRID_HZ)) * _CARRIER_GRID_HZ
+        if abs(place - setting) > _CARRIER_ERROR * setting or known.explains(float(place)):
+            continue
+        double = round(2 * place / step_hz)
+        around = height_db[double - 2 : double + 3]
+        if around.size and around.max() >= _DOUBLE_DB:
+            found.append(float(place))
+    return found
