@@ -278,9 +278,9 @@ def _sign(finding: Finding) -> Indication:
         channel=finding.channel,
         significance=-math.log10(max(p, _LEAST_P)),
         expected_order=finding.expected_order,
-        found_order=finding.found_order,
-        found_frequency_hz=finding.found_hz,
-        confidence=finding.confidence,
+        found_order=float(finding.found_order),
+        found_frequency_hz=float(finding.found_hz),
+        confidence=float(finding.confidence),
         words=_words(finding),
     )
 
@@ -293,8 +293,8 @@ def _trace(group: str, evidence: FamilyEvidence) -> Indication:
         channel=evidence.channel,
         significance=significance(evidence),
         expected_order=evidence.family.order,
-        found_order=evidence.found_order,
-        found_frequency_hz=evidence.found_hz,
+        found_order=float(evidence.found_order),
+        found_frequency_hz=float(evidence.found_hz),
         may_raise=False,
     )
 
