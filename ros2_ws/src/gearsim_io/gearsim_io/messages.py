@@ -11,6 +11,7 @@ from __future__ import annotations
 import array
 import dataclasses
 import json
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar, get_args, get_type_hints, overload
 
@@ -238,7 +239,11 @@ def _unmirror(msg: Any, short: str, cls: type[Any]) -> Any:
 
 def _from_field(value: Any, hint: Any) -> Any:
     origin_args = get_args(hint)
-    if hint in (float, int, str, bool) or isinstance(value, str):
+    if hint is float:
+        return (
+            value if value == value else math.nan
+        )  # one NaN for all, so that equal nameplates compare equal
+    if hint in (int, str, bool) or isinstance(value, str):
         return hint(value) if callable(hint) else value
     if isinstance(value, (array.array, np.ndarray)):
         return np.frombuffer(value, dtype=value.dtype if isinstance(value, np.ndarray) else value.typecode)

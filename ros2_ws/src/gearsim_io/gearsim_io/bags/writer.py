@@ -72,7 +72,9 @@ class BagWriter:
             self.path.mkdir(parents=True)
             return open(self.path / f"{self.path.name}_0.mcap", "wb")
         except FileExistsError:
-            raise InputError(str(self.path), "", "it exists already", "the name of a new bag") from None
+            raise InputError(
+                str(self.path), "", "a folder that exists already", "the name of a new bag"
+            ) from None
         except OSError as error:
             raise InputError(str(self.path), "", error.strerror, "a place for a new bag") from None
 

@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 from types import FrameType
 
@@ -18,14 +19,18 @@ from rclpy.signals import SignalHandlerOptions
 from gearsim_io.errors import EnvironmentLackError, InputError
 
 WAKE_S = 0.1
+PATIENCE_S = 1.0
 
 
 def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | None = None) -> int:
     """Spin the node that `make_node` makes, in a single-threaded executor.
 
-    SIGINT and SIGTERM end it with status 0; before that its method `finish()`, if it has one, is called
-    while the node can still publish. A second signal ends the process at once. `InputError` and parameters
-    that the node refuses give one line on stderr and status 2, `EnvironmentLackError` status 3.
+    SIGINT and SIGTERM end it with status 0, and a node ends by itself when it sets its attribute
+    `exit_status` to a number; before the end its method `finish()`, if it has one, is called while the
+    node can still publish. A signal more than a second after the first ends the process at once (not
+    earlier: Ctrl-C often reaches a process twice, from the terminal and from its parent).
+    `InputError` and parameters that the node refuses give one line on stderr and status 2,
+    `EnvironmentLackError` status 3.
 
     Parameters
     ----------
@@ -37,12 +42,14 @@ def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | Non
         Command line, the process's own by default.
     """
     stopping = False
+    told_s = 0.0
 
     def stop(_signum: int, _frame: FrameType | None) -> None:
-        nonlocal stopping
-        if stopping:
+        nonlocal stopping, told_s
+        if stopping and time.monotonic() - told_s > PATIENCE_S:
             os._exit(130)
-        stopping = True
+        if not stopping:
+            stopping, told_s = True, time.monotonic()
 
     previous = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     node: Node | None = None
@@ -52,7 +59,7 @@ def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | Non
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        while not stopping:
+        while not stopping and getattr(node, "exit_status", None) is None:
             executor.spin_once(timeout_sec=WAKE_S)
         executor.shutdown()
         finish = getattr(node, "finish", None)
@@ -71,4 +78,4 @@ def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | Non
             rclpy.try_shutdown()
         for number, handler in previous.items():
             signal.signal(number, handler)
-    return 0
+    return getattr(node, "exit_status", None) or 0
