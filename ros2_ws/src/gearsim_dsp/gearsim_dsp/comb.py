@@ -14,6 +14,7 @@ __all__ = ["CombGrid", "CombScores", "comb_grid", "score_combs"]
 LINE_CAP = 12.0
 HARMONIC_OPTIONS = (2, 4, 8)
 SIDEBAND_HARMONICS = 3
+_INDEPENDENT_TEMPLATES = 2.0  # the templates share lines; counted on noise, see docs/diagnosis.md
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +104,7 @@ def score_combs(tail: NDArray[np.float64], usable: NDArray[np.bool_], grid: Comb
         scores.append(_score(total, count))
     stacked = np.stack(scores)
     template = np.argmax(stacked, axis=0)
-    return CombScores(np.max(stacked, axis=0) - np.log(len(scores)), template)
+    return CombScores(np.max(stacked, axis=0) - np.log(_INDEPENDENT_TEMPLATES), template)
 
 
 def _take(

@@ -22,6 +22,7 @@ _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _CLEAR = 12.0
 _SIDEBANDS_EXPLAINED = 5
+_CELL_SHARE = 0.5  # independent looks per resolution cell of the 8th harmonic, counted on noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +157,7 @@ class FamilySearch:
         return comb_grid(order, half_width, self._spectra.order_step, lines, sideband, self._resolution)
 
     def _independent_orders(self, family: FaultFamily, half_width: float) -> float:
-        return 1.0 + 2 * half_width * family.order * 8 / self._resolution
+        return 1.0 + _CELL_SHARE * 2 * half_width * family.order * 8 / self._resolution
 
     def _modulation(self, grid: CombGrid, at: int) -> NDArray[np.float64]:
         """Mean square of a comb's lines, per band: a line of power m^2 / 4 is a cosine of mean square m^2 /
