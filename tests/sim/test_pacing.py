@@ -3,7 +3,9 @@
 import math
 
 import pytest
-from gearsim_sim.pacing import Pacer
+from gearsim_io.health import Level
+from gearsim_sim.outbox import Outbox
+from gearsim_sim.pacing import Pacer, PaceReport, StartGate, pace_status
 
 RATE = 65536.0
 BATCH = 4096
@@ -167,3 +169,58 @@ def test_impossible_factor(factor):
         Pacer(RATE, factor)
     with pytest.raises(ValueError, match="rate factor"):
         Pacer(RATE).set_factor(factor, 0.0)
+
+
+def test_the_gate_opens_when_all_have_come_and_nothing_changes():
+    gate = StartGate(2, settle_s=0.3)
+    assert not gate.is_open((0, 0, 0), 0.0)
+    assert not gate.is_open((1, 1, 0), 5.0)
+    assert not gate.is_open((1, 1, 0), 9.0)  # one is still missing
+    assert not gate.is_open((2, 1, 0), 10.0)
+    assert not gate.is_open((2, 2, 0), 10.2)  # the second stream's connection came later
+    assert not gate.is_open((2, 2, 0), 10.4)
+    assert gate.is_open((2, 2, 0), 10.5)
+    assert StartGate(0).is_open((0, 0, 0), 0.0)
+
+
+def test_status_in_words():
+    good = PaceReport(lag_s=0.01, achieved=1.0, wanted=1.0, slipped_s=0.0, keeping_up=True)
+    slow = PaceReport(lag_s=2.0, achieved=0.62, wanted=1.0, slipped_s=3.0, keeping_up=False)
+    fast = PaceReport(lag_s=0.0, achieved=11.8, wanted=0.0, slipped_s=0.0, keeping_up=True)
+    assert pace_status(good, paused=False) == (Level.OK, "1 x real time")
+    assert pace_status(good, paused=True) == (Level.OK, "paused")
+    assert pace_status(fast, paused=False) == (Level.OK, "as fast as it goes: 11.80 x real time")
+    level, text = pace_status(slow, paused=False)
+    assert level == Level.WARN
+    assert text == "cannot keep up: 0.62 x real time in place of 1 x, 5.0 s behind"
+
+
+class Transport:
+    def __init__(self):
+        self.got = []
+        self.refuse = 0
+
+    def send(self, message):
+        if self.refuse > 0:
+            self.refuse -= 1
+            raise OSError("cannot publish\ndata")
+        self.got.append(message)
+
+
+def test_refused_messages_wait_and_keep_their_order():
+    transport, outbox = Transport(), Outbox(OSError, room=3)
+    outbox.put(transport.send, 1)
+    assert outbox.flush()
+    transport.refuse = 2
+    for message in (2, 3, 4):
+        outbox.put(transport.send, message)
+    assert not outbox.flush()
+    assert outbox.full
+    assert (outbox.waiting, outbox.last_refusal) == (3, "cannot publish data")
+    assert not outbox.flush()
+    assert outbox.flush()
+    assert transport.got == [1, 2, 3, 4]
+    assert (outbox.sent, outbox.refused, outbox.waiting) == (4, 2, 0)
+    outbox.put(lambda _: 1 / 0, 5)
+    with pytest.raises(ZeroDivisionError):  # only what the transport refuses is kept for later
+        outbox.flush()

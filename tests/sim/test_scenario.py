@@ -87,7 +87,7 @@ timeline:
 def test_keys_can_be_replaced():
     scenario = load_scenario("quick", {"seed": 9, "batch_samples": 64})
     assert (scenario.name, scenario.seed, scenario.batch_samples) == ("quick", 9, 64)
-    with pytest.raises(InputError, match="quick.yaml: seed: got -1"):
+    with pytest.raises(InputError, match="seed: got -1"):
         load_scenario("quick", {"seed": -1})
 
 
@@ -123,8 +123,19 @@ BAD = [
         "timeline.0.inject: width_m: got 1 V, expected a number in m, > 0 (not V)",
     ),
     ("faults: [{kind: x}]", "faults.0.component: got nothing, expected this key"),
-    ("faults: [{kind: x, component: y, size: 3}]", "faults.0.size: got 3, expected no such key"),
+    (
+        "faults: [{kind: x, component: y, size: 3}]",
+        "faults.0.size: got 3, expected no such key; one of component, id, ",
+    ),
     ("faults: [{kind: x, component: y, severity: 3}]", "faults.0.severity: got 3, expected"),
+    (
+        "timeline: [{at: 1 s, set: {sped: 1}}]",
+        "set.sped: got 1, expected no such key; one of load, ramp, speed",
+    ),
+    (
+        "sensors: {accelerometers: {each: {b1_x: {r: 2}}}}",
+        "each.b1_x.r: got 2, expected no such key; one of adc_",
+    ),
     ("timeline: [{at: 8, clear: {}}]", "timeline.0.at: got 8, expected a number in s"),
     ("timeline: [{at: -1 s, clear: {}}]", "timeline.0.at: got -1 s, expected a number in s, >= 0"),
     ("timeline: [{at: 1 s}]", "expected one of inject, set, clear beside at"),

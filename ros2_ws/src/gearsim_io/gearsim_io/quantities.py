@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
@@ -149,6 +150,25 @@ def load_yaml(model: type[ModelT], path: Path, *, require_source: bool = False) 
 
 
 def _known_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
-    if len(loc) != 1:
-        return "see docs/ for the keys of this section"
-    return "one of " + ", ".join(sorted(f.alias or name for name, f in model.model_fields.items()))
+    section: Any = model
+    for part in loc[:-1]:
+        section = _inside(section, part)
+    if not _is_model(section):
+        return "a key of this section"
+    return "one of " + ", ".join(sorted(f.alias or name for name, f in section.model_fields.items()))
+
+
+def _inside(section: Any, part: int | str) -> Any:
+    """The type at one step of an error's path: a field of a model, or the content of a list or mapping."""
+    if _is_model(section):
+        fields = {f.alias or name: f for name, f in section.model_fields.items()}
+        inner: Any = fields[str(part)].annotation if str(part) in fields else None
+    else:
+        inner = next((kind for kind in get_args(section)[::-1] if kind is not Ellipsis), None)
+    if get_origin(inner) in (Union, UnionType):  # "or None"
+        inner = next(kind for kind in get_args(inner) if kind is not type(None))
+    return inner
+
+
+def _is_model(section: Any) -> bool:
+    return isinstance(section, type) and issubclass(section, BaseModel)

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from gearsim_io.health import Level
 
 _WINDOW_S = 2.0
 
@@ -183,3 +186,42 @@ class Pacer:
         self._anchor_samples -= samples
         self._slipped += samples
         self._last_slip_s = now_s
+
+
+class StartGate:
+    """Holds a stream back until its subscribers are there.
+
+    Both sides of a connection do not learn of each other at the same moment; so the gate opens when nothing
+    has changed for `settle_s`.
+
+    Parameters
+    ----------
+    wanted : int
+        Subscribers of the first stream to wait for; 0 opens at once.
+    """
+
+    def __init__(self, wanted: int, settle_s: float = 0.3) -> None:
+        self._wanted = wanted
+        self._settle_s = settle_s
+        self._found: tuple[int, ...] = ()
+        self._since_s = math.inf
+
+    def is_open(self, subscribers: Sequence[int], now_s: float) -> bool:
+        """True if the stream may begin, with so many subscribers of each of its parts now."""
+        found = tuple(subscribers)
+        if found != self._found or self._since_s == math.inf:
+            self._found, self._since_s = found, now_s
+        return self._wanted == 0 or (found[0] >= self._wanted and now_s - self._since_s >= self._settle_s)
+
+
+def pace_status(pace: PaceReport, *, paused: bool) -> tuple[Level, str]:
+    """Level and one line for people."""
+    if paused:
+        return Level.OK, "paused"
+    if pace.wanted == 0:
+        return Level.OK, f"as fast as it goes: {pace.achieved:.2f} x real time"
+    if pace.keeping_up:
+        return Level.OK, f"{pace.wanted:g} x real time"
+    behind = pace.lag_s + pace.slipped_s
+    wanted = f"{pace.achieved:.2f} x real time in place of {pace.wanted:g} x"
+    return Level.WARN, f"cannot keep up: {wanted}, {behind:.1f} s behind"

@@ -14,13 +14,20 @@ from gearsim_io.errors import InputError
 T = TypeVar("T")
 
 
-def parameter(default: Any, help_text: str, low: float | None = None, high: float | None = None) -> Any:
-    """A field of a parameter dataclass: default, what it is for, and the range it must lie in."""
-    return dataclasses.field(default=default, metadata={"help": help_text, "range": (low, high)})
+def parameter(
+    default: Any, help_text: str, low: float | None = None, high: float | None = None, *, live: bool = False
+) -> Any:
+    """A field of a parameter dataclass: default, what it is for, and the range it must lie in.
+
+    A `live` parameter may be changed while the node runs; the node hears of it by a callback of its own.
+    """
+    return dataclasses.field(
+        default=default, metadata={"help": help_text, "range": (low, high), "live": live}
+    )
 
 
 def declare_parameters(node: Node, cls: type[T]) -> T:
-    """Declare every field of `cls` as a parameter that is set at start and not changed afterwards.
+    """Declare every field of `cls` as a parameter, set at start and (but for live ones) not changed after.
 
     rclpy itself refuses wrong types and values out of range; what it raises is turned into one clear line.
 
@@ -36,7 +43,8 @@ def declare_parameters(node: Node, cls: type[T]) -> T:
     values: dict[str, Any] = {}
     for spec in dataclasses.fields(cls):  # type: ignore[arg-type]
         low, high = spec.metadata.get("range", (None, None))
-        descriptor = ParameterDescriptor(description=spec.metadata.get("help", ""), read_only=True)
+        descriptor = ParameterDescriptor(description=spec.metadata.get("help", ""))
+        descriptor.read_only = not spec.metadata.get("live", False)
         if isinstance(spec.default, float) and low is not None:
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=float(low), to_value=float(high))

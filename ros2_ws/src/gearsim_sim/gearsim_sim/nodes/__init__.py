@@ -1,0 +1,1 @@
+"""Nodes: they translate between topics and the numerics, nothing more."""
