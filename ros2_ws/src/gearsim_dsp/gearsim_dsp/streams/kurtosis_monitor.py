@@ -61,7 +61,7 @@ class _Channel:
     crest: float
     band: Band
     band_kurtosis: float
-    band_error: float
+    steady_kurtosis: float
     band_rms: float
     significance: float
 
@@ -147,7 +147,7 @@ class KurtosisMonitor:
             crest=crest_factor(samples),
             band=bands[best],
             band_kurtosis=float(found.kurtosis[best]),
-            band_error=float(found.standard_error[best]),
+            steady_kurtosis=float(found.steady_kurtosis[best]),
             band_rms=math.sqrt(float(envelopes.values[best].mean(dtype=np.float64))),
             significance=-math.log10(float(found.p_value[best])),
         )
@@ -157,7 +157,7 @@ class KurtosisMonitor:
         """One block per turn where the speed is known, within what the statistics need."""
         turns = window.sample_count / window.sample_rate_hz * speed.value_hz
         wanted = int(turns) if math.isfinite(turns) else _MOST_BLOCKS // 2
-        return min(max(wanted, _FEWEST_BLOCKS), _MOST_BLOCKS, max(samples // 8, 4))
+        return min(max(wanted, _FEWEST_BLOCKS), _MOST_BLOCKS, max(samples // 8, 5))
 
     def _features(self, window: Window, channel: _Channel, speed: ShaftSpeed) -> tuple[Features, Features]:
         """Of the whole channel, and of its most impulsive band."""
@@ -169,7 +169,7 @@ class KurtosisMonitor:
         part = (
             FeatureValue("band_rms", "", channel.band_rms, window.unit),
             FeatureValue("band_kurtosis", "", channel.band_kurtosis, "1"),
-            FeatureValue("band_kurtosis_error", "", channel.band_error, "1"),
+            FeatureValue("band_kurtosis_steady", "", channel.steady_kurtosis, "1"),
             FeatureValue("impulsiveness_significance", "", channel.significance, "-log10 P"),
         )
         all_hz = Band(0.0, 0.5 * window.sample_rate_hz, "whole")
@@ -200,7 +200,7 @@ def _indications(channels: list[_Channel]) -> tuple[Indication, ...]:
     best = max(channels, key=lambda c: c.significance)
     low, high = best.band.low_hz / 1e3, best.band.high_hz / 1e3
     words = (
-        f"impacts on {best.name}: excess kurtosis {best.band_kurtosis:.1f} at {low:.1f} to {high:.1f} kHz, "
+        f"impacts on {best.name}: excess kurtosis {best.steady_kurtosis:.1f} at {low:.1f} to {high:.1f} kHz, "
         f"where modulated noise reaches {FULL_MODULATION_KURTOSIS:.1f} at most"
     )
     sign = Indication(
