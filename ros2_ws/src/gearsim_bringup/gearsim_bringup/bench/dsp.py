@@ -1,0 +1,71 @@
+"""Signal processing of 10 s at 65536 Hz, beside independent implementations of the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from gearsim_dsp.diagnose import diagnose_record
+from gearsim_dsp.envelope import envelope_spectrum, squared_envelopes, window_spectrum
+from gearsim_dsp.kurtogram import fast_kurtogram
+from gearsim_io.machines import load_machine
+from gearsim_io.record import Record
+from numpy.typing import NDArray
+from scipy.fft import rfft
+from scipy.signal import butter, hilbert, sosfiltfilt
+
+from gearsim_bringup.bench.clock import alternate, cpu_seconds
+from gearsim_bringup.bench.figure import Figure, Goal
+from gearsim_bringup.ui import Voice
+
+RATE_HZ = 65536.0
+SECONDS = 10.0
+BAND_HZ = (4000.0, 8000.0)
+LEVELS = 7
+
+
+def measure(_voice: Voice) -> Iterator[Figure]:
+    """Kurtogram, squared envelope spectrum, and the diagnosis of a record of one channel."""
+    signal = _signal()
+    try:
+        from pysdkit.utils._kurtogram import fast_kurtogram as theirs
+    except ImportError:  # a test oracle, absent where only the program is installed
+        own = cpu_seconds(lambda: fast_kurtogram(signal, RATE_HZ, LEVELS), 3)
+        yield Figure("dsp.kurtogram_s", own, "s", Goal("<=", 0.5, on_ratio=True))
+    else:
+        own, peer = alternate(
+            lambda: fast_kurtogram(signal, RATE_HZ, LEVELS), lambda: theirs(signal, LEVELS, RATE_HZ), 3
+        )
+        yield Figure("dsp.kurtogram_s", own, "s", Goal("<=", 0.5, on_ratio=True), ("PySDKit 0.5.0", peer))
+    own, peer = alternate(lambda: _ses(signal), lambda: _plain_ses(signal))
+    yield Figure("dsp.ses_s", own, "s", Goal("<=", 1, on_ratio=True), ("scipy band-pass + hilbert", peer))
+    machine = load_machine("unsw_parallel")
+    record = Record(RATE_HZ, (machine.channels[0].name,), "m/s^2", signal.astype(np.float32)[None, :])
+    whole = cpu_seconds(lambda: diagnose_record(record, machine), 2)
+    yield Figure("diagnose.record_s", whole, "s", Goal("<=", 4.0), ("the record's duration", SECONDS))
+
+
+def _signal() -> NDArray[np.float64]:
+    """Noise with decaying knocks 48.8 times a second, each with one percent of jitter."""
+    generator = np.random.default_rng(7)
+    count = round(RATE_HZ * SECONDS)
+    knocks = np.zeros(count)
+    times = np.cumsum(generator.normal(1 / 48.8, 0.01 / 48.8, math.ceil(48.8 * SECONDS)))
+    knocks[(times[times < SECONDS] * RATE_HZ).astype(int)] = 1.0
+    t = np.arange(800) / RATE_HZ
+    ringing = np.exp(-1200 * t) * np.sin(2 * np.pi * 6000 * t)
+    return generator.normal(0, 0.3, count) + np.convolve(knocks, ringing)[:count]
+
+
+def _ses(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    band = np.array([BAND_HZ[0]])
+    return envelope_spectrum(
+        squared_envelopes(window_spectrum(signal, RATE_HZ), band, BAND_HZ[1] - BAND_HZ[0])
+    )[0]
+
+
+def _plain_ses(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    sections = butter(4, BAND_HZ, "bandpass", fs=RATE_HZ, output="sos")
+    squared = np.abs(hilbert(sosfiltfilt(sections, signal))) ** 2
+    return np.abs(rfft(squared - squared.mean())) ** 2

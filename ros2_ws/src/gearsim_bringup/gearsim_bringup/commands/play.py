@@ -1,0 +1,63 @@
+"""`gearsim play`: a bag as a live stream."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gearsim_bringup.options import ANY_PATH, example
+
+EXAMPLE = """
+./gearsim play out/my_bag
+./gearsim play out/my_bag --rate 4 --diagnose
+"""
+
+
+@click.command("play", epilog=example(EXAMPLE))
+@click.argument("bag", type=ANY_PATH)
+@click.option(
+    "--rate",
+    default=1.0,
+    type=click.FloatRange(0, 1000),
+    help="Times the recorded pace; 0: as fast as it goes.",
+)
+@click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
+@click.option("--diagnose", is_flag=True, help="Start the diagnostic nodes too and print their alarms.")
+def command(bag: Path, rate: float, loop: bool, diagnose: bool) -> int:
+    """Play a BAG on the topics it was recorded from, with /clock.
+
+    With --diagnose the bag's own features, spectra and alarms are left out: the nodes make new ones.
+    """
+    from gearsim_bringup.live import MONITORS, player
+
+    if not diagnose:
+        from gearsim_io.nodes.player import main
+
+        spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)
+        return int(main(["gearsim", *spec.arguments()]))
+    spec = player(bag, rate=rate, loop=loop, listeners=len(MONITORS), signals_only=True)
+    _judge(bag, spec)
+    return 0
+
+
+def _judge(bag: Path, spec: object) -> None:
+    import tempfile
+
+    from gearsim_io import cdr, qos
+    from gearsim_io.bags import read_bag
+    from gearsim_io.errors import InputError
+
+    from gearsim_bringup.live import LiveRun
+    from gearsim_bringup.processes import NodeSpec
+    from gearsim_bringup.tell import Teller
+    from gearsim_bringup.ui import Voice
+
+    assert isinstance(spec, NodeSpec)
+    first = next(iter(read_bag(bag, (qos.ACCEL.full_name,))), None)
+    place = None if first is None else cdr.position(first.data, first.type)
+    if place is None:
+        raise InputError(str(bag), qos.ACCEL.full_name, "nothing", "samples to diagnose")
+    teller = Teller(Voice(json_mode=False), place.sample_rate_hz)
+    with tempfile.TemporaryDirectory(prefix="gearsim_play_") as logs:
+        LiveRun(spec, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth).run()

@@ -1,0 +1,53 @@
+"""`gearsim run`: the live graph."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gearsim_bringup.options import ANY_PATH, POSITIVE, example
+from gearsim_bringup.ui import Voice
+
+EXAMPLE = """
+./gearsim run healthy
+./gearsim run demo --seconds 30 --record out/my_bag --view out/my_run.rrd
+"""
+
+
+@click.command("run", epilog=example(EXAMPLE))
+@click.argument("scenario")
+@click.option(
+    "--seconds", type=POSITIVE, help="End after so many simulated seconds (default: Ctrl-C ends it)."
+)
+@click.option("--rate", type=click.FloatRange(0, 1000), help="Times real time; 0 is as fast as it goes.")
+@click.option("--record", "bag", type=ANY_PATH, help="Record to this new bag.")
+@click.option("--view", "rrd", type=ANY_PATH, help="Write a rerun recording of the run.")
+def command(
+    scenario: str, seconds: float | None, rate: float | None, bag: Path | None, rrd: Path | None
+) -> None:
+    """Run simulator and diagnostic nodes live on a SCENARIO (a shipped name, or a YAML file).
+
+    Topics are under /gearsim, in the ROS domain of the environment; watch with `ros2 topic echo
+    /gearsim/alarm`. Ctrl-C ends it.
+    """
+    from gearsim_sim.scenario import load_scenario
+
+    from gearsim_bringup.live import MONITORS, LiveRun, simulator
+    from gearsim_bringup.tell import Teller
+
+    loaded = load_scenario(scenario)
+    voice = Voice(json_mode=False)
+    teller = Teller(voice, loaded.sample_rate_hz)
+    listeners = len(MONITORS) + (bag is not None) + (rrd is not None)
+    source = simulator(str(Path(loaded.source)), end_after=seconds or 0.0, rate=rate, listeners=listeners)
+    custom: dict[str, Any] = {"scenario": loaded.name, "seed": str(loaded.seed)}
+    with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
+        voice.say(f"scenario {loaded.name}: {loaded.description}")
+        voice.say("topics under /gearsim; Ctrl-C ends the run")
+        LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth).run()
+    for path in (bag, rrd):
+        if path is not None:
+            voice.say(f"written: {path}")

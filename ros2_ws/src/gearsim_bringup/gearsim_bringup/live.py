@@ -1,0 +1,169 @@
+"""The live graph: which nodes run with which parameters, and what a command sees of them."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gearsim_io import qos
+from gearsim_io.errors import InputError
+
+from gearsim_bringup.processes import Graph, NodeProcess, NodeSpec
+from gearsim_bringup.ui import JobFailedError
+
+MONITORS = ("envelope", "kurtosis")
+_READY_S = 60.0
+
+
+@dataclass
+class LiveRun:
+    """One run of a graph.
+
+    Parameters
+    ----------
+    source : NodeSpec
+        Simulator or player.
+    log_dir : Path
+        Where the nodes' output goes.
+    bag : Path, optional
+        Records to there.
+    custom_data : mapping
+        Kept in the bag.
+    rrd : Path, optional
+        Shows the run as a rerun recording.
+    on_alarm, on_truth : callable, optional
+        Called with each message as it arrives.
+    """
+
+    source: NodeSpec
+    log_dir: Path
+    bag: Path | None = None
+    custom_data: Mapping[str, str] = field(default_factory=dict)
+    rrd: Path | None = None
+    on_alarm: Callable[[Any], None] | None = None
+    on_truth: Callable[[Any], None] | None = None
+
+    def sinks(self) -> list[NodeSpec]:
+        """Everything that listens, in the order in which it starts."""
+        specs = []
+        if self.bag is not None:
+            values = {"bag": str(self.bag), "custom_data": json.dumps(dict(self.custom_data))}
+            specs.append(NodeSpec("recorder", "gearsim_io.nodes.recorder", values))
+        if self.rrd is not None:
+            specs.append(NodeSpec("viewer", "gearsim_io.nodes.viewer", {"out": str(self.rrd)}))
+        return specs + [NodeSpec(name, f"gearsim_dsp.nodes.{name}") for name in MONITORS]
+
+    def run(self, on_start: Callable[[Graph], None] | None = None) -> Outcome:
+        """Run until the source ends by itself, or Ctrl-C. `on_start` is told when all processes are up.
+
+        Raises
+        ------
+        InputError
+            If another rig publishes already, or a node was given bad parameters.
+        JobFailedError
+            If a node ends with an error.
+        """
+        from gearsim_bringup.nodes.watcher import Watcher
+
+        outcome = Outcome()
+        with Watcher(self.on_alarm, self.on_truth) as watcher, Graph(self.log_dir) as graph:
+            watcher.spin(0.5)
+            if watcher.publishers_of(qos.ACCEL):
+                expected = "none; end the other rig, or set another ROS_DOMAIN_ID"
+                raise InputError(qos.ACCEL.full_name, "publishers", "one already", expected)
+            for spec in self.sinks():
+                graph.start(spec)
+            source = graph.start(self.source)
+            began = time.monotonic()
+            if on_start is not None:
+                on_start(graph)
+            self._watch(watcher, graph, source)
+            outcome.wall_seconds = time.monotonic() - began
+            if graph.failed() is None:
+                self._drain(watcher)
+            graph.stop()
+            watcher.spin(0.5)
+            outcome.seen = watcher.seen
+        self._check(graph)
+        return outcome
+
+    def _watch(self, watcher: Any, graph: Graph, source: NodeProcess) -> None:
+        def over() -> bool:
+            return source.returncode() is not None or graph.failed() is not None
+
+        try:
+            watcher.spin(float("inf"), over)
+        except KeyboardInterrupt:
+            graph.stop()
+            self._check(graph)
+            raise
+
+    def _drain(self, watcher: Any) -> None:
+        """Give the monitors time to judge what they have received."""
+        count = -1
+        end = time.monotonic() + 10.0
+        while count != len(watcher.seen.alarms) and time.monotonic() < end:
+            count = len(watcher.seen.alarms)
+            watcher.spin(1.0)
+
+    def _check(self, graph: Graph) -> None:
+        failed = graph.failed()
+        if failed is None:
+            return
+        words = failed.last_words()
+        if failed.returncode() == 2:
+            name, _, rest = words.partition(": ")
+            raise BadNodeError(rest if name == failed.spec.name else words)
+        raise JobFailedError(f"node {failed.spec.name} ended with status {failed.returncode()}: {words}")
+
+
+class BadNodeError(InputError):
+    """A node's own one-line complaint about its input, passed on as it is."""
+
+    def __init__(self, line: str) -> None:
+        self._line = line
+        super().__init__(line, "", "", "")
+
+    def __str__(self) -> str:
+        return self._line
+
+
+@dataclass
+class Outcome:
+    """What a run brought; `seen` as in `nodes.watcher`."""
+
+    wall_seconds: float = 0.0
+    seen: Any = None
+
+
+def simulator(scenario: str, *, end_after: float, rate: float | None, listeners: int) -> NodeSpec:
+    """The simulator as a source; `listeners` subscribers of accel must be there before sample 0."""
+    parameters: dict[str, Any] = {
+        "scenario": scenario,
+        "end_after": float(end_after),
+        "wait_for_subscribers": listeners,
+    }
+    if rate is not None:
+        parameters["rate_factor"] = float(rate)
+    return NodeSpec("simulator", "gearsim_sim.nodes.simulator", parameters)
+
+
+def player(bag: Path, *, rate: float, loop: bool, listeners: int, signals_only: bool) -> NodeSpec:
+    """The player as a source; `listeners` subscribers of accel must be there before the first message."""
+    parameters: dict[str, Any] = {
+        "bag": str(bag),
+        "rate": float(rate),
+        "loop": loop,
+        "signals_only": signals_only,
+    }
+    if listeners:
+        parameters |= {
+            "wait_for": [qos.ACCEL.full_name],
+            "min_subscribers": listeners,
+            "wait_timeout_s": _READY_S,
+        }
+    return NodeSpec("player", "gearsim_io.nodes.player", parameters)

@@ -1,0 +1,54 @@
+"""The live rig: simulator and diagnostic nodes, with a recorder if asked.
+
+ros2 launch gearsim_bringup rig.launch.py scenario:=demo bag:=/tmp/demo_bag
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+
+def generate_launch_description():
+    """Declare the arguments and nodes."""
+    namespace = LaunchConfiguration("namespace")
+    bag = LaunchConfiguration("bag")
+    arguments = [
+        DeclareLaunchArgument(
+            "scenario", default_value="demo", description="shipped name or path of a YAML file"
+        ),
+        DeclareLaunchArgument(
+            "rate_factor", default_value="1.0", description="times real time, 0 as fast as it goes"
+        ),
+        DeclareLaunchArgument("namespace", default_value="gearsim"),
+        DeclareLaunchArgument(
+            "bag", default_value="", description="folder to record to; empty: no recording"
+        ),
+    ]
+    simulator = Node(
+        package="gearsim_sim",
+        executable="simulator",
+        namespace=namespace,
+        output="screen",
+        parameters=[
+            {
+                "scenario": LaunchConfiguration("scenario"),
+                "rate_factor": ParameterValue(LaunchConfiguration("rate_factor"), value_type=float),
+            }
+        ],
+    )
+    monitors = [
+        Node(package="gearsim_dsp", executable=name, namespace=namespace, output="screen")
+        for name in ("envelope", "kurtosis")
+    ]
+    recorder = Node(
+        package="gearsim_io",
+        executable="recorder",
+        namespace=namespace,
+        output="screen",
+        parameters=[{"bag": bag}],
+        condition=IfCondition(PythonExpression(["'", bag, "' != ''"])),
+    )
+    return LaunchDescription([*arguments, recorder, *monitors, simulator])
