@@ -3,6 +3,7 @@
 import pytest
 from gearsim_io.errors import InputError
 from gearsim_sim.params import load_parallel_params
+from gearsim_sim.params.overrides import override
 
 
 def test_numbers_of_the_model_are_replaced_and_nothing_else():
@@ -22,6 +23,13 @@ def test_numbers_of_the_model_are_replaced_and_nothing_else():
     assert changed.model.pedestal.stiffness_n_per_m == plain.model.pedestal.stiffness_n_per_m
     assert changed.model.seats["bearing_1"] == plain.model.seats["bearing_1"]
     assert load_parallel_params("unsw_parallel").model == plain.model
+
+
+def test_the_section_itself_stays_as_it_is():
+    section = {"pedestal": {"mass": {"value": 1, "unit": "kg", "source": "x"}}}
+    changed = override(section, {"pedestal.mass": "2 kg"}, "my.yaml")
+    assert changed["pedestal"]["mass"]["value"] == "2"
+    assert section["pedestal"]["mass"]["value"] == 1
 
 
 @pytest.mark.parametrize(

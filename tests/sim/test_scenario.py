@@ -92,8 +92,10 @@ def test_keys_can_be_replaced():
 
 
 def test_event_times_become_the_nearest_sample(tmp_path):
-    scenario = _load(tmp_path, "sample_rate: 48 kHz\ntimeline:\n  - {at: 0.1 s, clear: {}}\n")
-    assert scenario.events[0].at_sample == 4800
+    scenario = _load(
+        tmp_path, "sample_rate: 16384 Hz\ntimeline: [{at: 0.1 s, clear: {}}, {at: 0.2 s, clear: {}}]"
+    )
+    assert [event.at_sample for event in scenario.events] == [1638, 3277]
 
 
 def test_full_scale_is_not_known_without_a_range(tmp_path):
