@@ -24,7 +24,7 @@ from gearsim_dsp.streams.band_keeper import BandKeeper
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
 
-__all__ = ["EnvelopeMonitor", "EnvelopeSettings", "group_of", "significance"]
+__all__ = ["EnvelopeMonitor", "EnvelopeSettings", "group_of", "indications", "significance"]
 
 _LEAST_P = 1e-300
 _KEEPS = 0.5
@@ -128,7 +128,7 @@ class EnvelopeMonitor:
             frame_id=self.machine.name,
             features=tuple(self._features(window, result, verdict) for result in results if result.spectra),
             spectra=tuple(self._spectrum(window, result, verdict) for result in results if result.spectra),
-            indications=_indications(verdict) if judged else (),
+            indications=indications(verdict) if judged else (),
             tests=1,
             judged=judged,
             note="" if judged else self._why_not(quality, speed),
@@ -258,7 +258,7 @@ def _of_channel(verdict: Verdict, channel: str) -> Iterable[FamilyEvidence]:
     return (evidence for evidence in verdict.by_channel if evidence.channel == channel)
 
 
-def _indications(verdict: Verdict) -> tuple[Indication, ...]:
+def indications(verdict: Verdict) -> tuple[Indication, ...]:
     """Findings, and what is no finding (any more) but still half as large as one must be."""
     found = {group_of(f.fault, f.expected_order): _sign(f) for f in verdict.findings}
     for evidence in verdict.evidence:
