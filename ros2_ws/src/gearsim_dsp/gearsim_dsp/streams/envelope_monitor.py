@@ -53,7 +53,7 @@ class EnvelopeSettings:
     window: WindowSettings = field(default_factory=WindowSettings)
     band_hz: tuple[float, float] | None = None
     memory_windows: int = 0
-    kurtogram_every: int = 4
+    kurtogram_every: int = 16
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
