@@ -259,7 +259,7 @@ class AlarmBook:
         alarm = Alarm(
             t_ns=self._t_ns,
             frame_id=self.frame_id,
-            alarm_id=f"{self.source}/{slot.component}/{base.fault}",
+            alarm_id=f"{self.source}/{slot.component or 'machine'}/{base.fault}",
             source=self.source,
             component=slot.component,
             fault=base.fault,

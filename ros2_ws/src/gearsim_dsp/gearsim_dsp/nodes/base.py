@@ -35,13 +35,7 @@ DRAIN_S = 3.0
 class MonitorNode(Node):
     """A monitor on the topics of a source.
 
-    Parameters
-    ----------
-    source : str
-        Name of the node and of what it publishes.
-    parameters : subclass of MonitorParameters
-    make_monitor : callable
-        Makes the monitor of a machine from the nameplate and the parameters.
+    `make_monitor(machine, parameters=...)` makes the monitor; `source` names the node and what it publishes.
     """
 
     def __init__(
@@ -69,10 +63,9 @@ class MonitorNode(Node):
         self._failed_sends = 0
         self._started_s = time.monotonic()
         self._finish_by_s = float("inf")
-        self._features = qos.create_publisher(self, qos.FEATURES)
-        self._spectrum = qos.create_publisher(self, qos.SPECTRUM)
-        self._alarm = qos.create_publisher(self, qos.ALARM)
-        self._alarm_state = qos.create_publisher(self, qos.ALARM_STATE.of(source))
+        topics = (qos.FEATURES, qos.SPECTRUM, qos.ALARM, qos.ALARM_STATE.of(source))
+        made = [qos.create_publisher(self, topic) for topic in topics]
+        self._features, self._spectrum, self._alarm, self._alarm_state = made
         self._inputs = [qos.MACHINE_INFO]
         qos.create_subscription(self, qos.MACHINE_INFO, self._on_machine)
         self._listen(qos.ACCEL)
@@ -171,9 +164,7 @@ class MonitorNode(Node):
         level, words = self._machine_verdict()
         self._health.report("machine", level, words)
         trouble = ("machine", words) if level != Level.OK else ("", "")
-        if self._watch.stale:
-            trouble = ("stale", stream.message)
-        changed = self._keeper.troubled(*trouble)
+        changed = self._keeper.troubled(*(("stale", stream.message) if self._watch.stale else trouble))
         if changed is not None:
             self._send(self._alarm_state, changed)
         self._report_alarms()
@@ -190,12 +181,11 @@ class MonitorNode(Node):
     def _report_alarms(self) -> None:
         state = self._keeper.state
         words = "; ".join(alarm.reason for alarm in state.active) or state.note or "no alarm"
-        values = {
+        latency = {
             "latency of the last window [ms]": self._latency_ms,
             "longest latency [ms]": self._worst_ms,
-            "messages not sent": self._failed_sends,
         }
-        self._health.report("alarms", state.level, words, values)
+        self._health.report("alarms", state.level, words, latency | {"messages not sent": self._failed_sends})
 
     def _check_types(self) -> None:
         for topic in self._inputs:
