@@ -119,7 +119,10 @@ def _chance(node: KurtogramNode, kurtogram: Kurtogram) -> float:
     about a sixth of one segment's variance.
     """
     independent = kurtogram.samples / 2 ** (node.level + 1) / _SEGMENTS
-    return _CHANCE_SIGMA * float(np.sqrt(4.0 / max(independent, 1.0) / 6.0))
+    top_hz = kurtogram.nodes[0].high_hz
+    # Next to 0 Hz and to half the rate the filters let mirror frequencies in: the envelope is nearly real.
+    mirrored = node.low_hz < 0.5 * node.width_hz or node.high_hz > top_hz - 0.5 * node.width_hz
+    return _CHANCE_SIGMA * float(np.sqrt(4.0 / max(independent, 1.0) / 6.0)) + (1.0 if mirrored else 0.0)
 
 
 def rolloff_hz(samples: NDArray[np.float32] | NDArray[np.float64], sample_rate_hz: float) -> float:

@@ -19,6 +19,9 @@ _MAX_BANDS = 12
 _MIN_TURNS = 8.0
 _HARMONICS = 8
 _BAND_HARMONICS = 4
+_CLEAR_OF = 6.0
+"""The bank begins at so many times the highest fault frequency: below it the fault lines of the signal itself
+(ball passes, waviness) would beat against each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,33 +77,33 @@ def plan_bands(
     if not families or not (math.isfinite(speed_hz) and speed_hz > 0):
         return None, []
     turns = samples / sample_rate_hz * speed_hz
-    nominal_turns = samples / sample_rate_hz * machine.nominal_speed_hz
-    need = _MIN_TURNS
-    if turns < need:
-        least = f"at least {need:.0f} are needed ({need / speed_hz:.2g} s at {speed_hz:.3g} Hz)"
+    if turns < _MIN_TURNS:
+        least = f"at least {_MIN_TURNS:.0f} are needed ({_MIN_TURNS / speed_hz:.2g} s at {speed_hz:.3g} Hz)"
         return None, [("too_short", f"{turns:.1f} turns of the shaft; {least}")]
-    reach = max(f.order + f.sideband_order for f in families)
-    least_width = 2.2 * reach * speed_hz
-    good_width = _BAND_HARMONICS * least_width
+    plan_hz = _plan_speed(speed_hz, machine.nominal_speed_hz)
+    reach_hz = plan_hz * max(f.order + f.sideband_order for f in families)
+    least_width = 2.2 * reach_hz
     step_hz = sample_rate_hz / samples
-    floor = max(4 * step_hz, 0.005 * sample_rate_hz)
     ceiling = TOP_SHARE * sample_rate_hz
+    floor = max(4 * step_hz, 0.005 * sample_rate_hz, min(_CLEAR_OF * reach_hz, 0.2 * ceiling))
     if ceiling - floor < max(least_width, 32 * step_hz):
         need_hz = (least_width + floor) / TOP_SHARE
-        return None, [
-            ("rate_too_low", f"{sample_rate_hz:g} Hz; at least {need_hz:.0f} Hz are needed for these lines")
-        ]
-    count = min(_MAX_BANDS, max(1, int((ceiling - floor) / max(good_width, 32 * step_hz))))
+        detail = f"{sample_rate_hz:g} Hz; at least {need_hz:.0f} Hz are needed for the lines sought"
+        return None, [("rate_too_low", detail)]
+    good_width = max(_BAND_HARMONICS * least_width, 32 * step_hz)
+    count = min(_MAX_BANDS, max(1, int((ceiling - floor) / good_width)))
     width = (ceiling - floor) / count
     bank = tuple(Band(floor + k * width, floor + (k + 1) * width, "bank") for k in range(count))
-    top = min(_HARMONICS * max(f.order for f in families), 0.8 * width / speed_hz)
-    step = _order_step(turns, nominal_turns)
-    return BandPlan(bank, width, top, step, floor, ceiling, least_width), []
+    top = min(_HARMONICS * max(f.order for f in families), 0.8 * width / plan_hz)
+    order_step = 0.5 / math.ceil(samples / sample_rate_hz * plan_hz)
+    return BandPlan(bank, width, top, order_step, floor, ceiling, least_width), []
 
 
-def _order_step(turns: float, nominal_turns: float) -> float:
-    """Half the resolution of the nominal number of turns; the same for all speeds near the nominal one."""
-    lines = 1.1 * nominal_turns if math.isfinite(nominal_turns) else 1.1 * turns
-    while lines < turns:
-        lines *= 1.25
-    return 0.5 / math.ceil(lines)
+def _plan_speed(speed_hz: float, nominal_hz: float) -> float:
+    """A speed a little above the shaft's that is the same for all near it, so that windows share their bands.
+
+    The steps are 25 % apart, the first one 10 % above the nominal speed (or above 1 Hz where that is
+    unknown).
+    """
+    base = 1.1 * (nominal_hz if math.isfinite(nominal_hz) else 1.0)
+    return float(base * 1.25 ** math.ceil(math.log(speed_hz / base) / math.log(1.25) - 1e-9))

@@ -21,6 +21,9 @@ _BLOCK_LINES = 160
 _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _CLEAR = 12.0
+_REFINE_SHARE = 0.25
+_PLATEAU = 0.7
+_TOP_HARMONICS = 4
 _SIDEBANDS_EXPLAINED = 5
 _CELL_SHARE = 0.5  # independent looks per resolution cell of the 8th harmonic, counted on noise
 
@@ -127,13 +130,13 @@ class FamilySearch:
         half_width = family.tolerance + self._doubt
         grid = self._grid(family, family.order * self._scale, half_width)
         scores = score_combs(self._tail, self._usable, grid)
-        row, best = np.unravel_index(int(np.argmax(scores.score)), scores.score.shape)
+        row, best = self._peak(grid, scores.score)
         trials = scores.score.shape[0] * self._independent_orders(family, half_width)
-        p = search_false_alarm(min(1.0, float(np.exp(-scores.score[row, best]))), trials * self._looks)
-        modulation = self._modulation(grid, int(best))
+        p = search_false_alarm(min(1.0, float(np.exp(-scores.score[row].max()))), trials * self._looks)
+        modulation = self._modulation(grid, best)
         band = self._band(scores.score[:, best], modulation, trials)
-        found = self._refined(grid, int(best), int(row))
-        harmonics, sidebands = self._snr_db(grid, int(best), band)
+        found = self._refined(grid, best, row)
+        harmonics, sidebands = self._snr_db(grid, best, band)
         spectra = self._spectra
         return FamilyEvidence(
             family=family,
@@ -156,6 +159,17 @@ class FamilySearch:
         sideband = family.sideband_order * self._scale
         return comb_grid(order, half_width, self._spectra.order_step, lines, sideband, self._resolution)
 
+    def _peak(self, grid: CombGrid, score: NDArray[np.float64]) -> tuple[int, int]:
+        """Row and candidate of the best comb; of candidates about as improbable, that on the lines' tops."""
+        row = int(np.argmax(score.max(axis=1)))
+        near = score[row] >= _PLATEAU * score[row].max()
+        index = grid.harmonics[:, :_TOP_HARMONICS]
+        on = (index >= 0) & self._usable[index]
+        height = np.log(np.maximum(self._ratio[row, index], 1e-3)) * on
+        # The mean, not the sum: a candidate must not lose because one of its lines falls on the shaft's.
+        mean = height.sum(axis=1) / np.maximum(on.sum(axis=1), 1)
+        return row, int(np.argmax(np.where(near & (on.sum(axis=1) >= 2), mean, -np.inf)))
+
     def _independent_orders(self, family: FaultFamily, half_width: float) -> float:
         return 1.0 + _CELL_SHARE * 2 * half_width * family.order * 8 / self._resolution
 
@@ -177,10 +191,13 @@ class FamilySearch:
         return int(np.argmax(np.where(clear, modulation, -1.0)))
 
     def _refined(self, grid: CombGrid, at: int, row: int) -> float:
-        """Fundamental on the axis from the interpolated peaks of the harmonics that stand out clearly."""
+        """Fundamental on the axis from the interpolated peaks of the strongest harmonics.
+
+        Slip widens a line as the square of its number, so harmonics that have lost more than 6 dB against the
+        strongest say little; those left weigh by the square of their number and by their power.
+        """
         spectrum = self._ratio[row]
-        rough = float(grid.fundamentals[at])
-        weights, values = 0.0, 0.0
+        peaks = []
         for number, index in enumerate(grid.harmonics[at], start=1):
             if not 2 <= index < spectrum.size - 2 or not self._usable[index]:
                 continue
@@ -190,11 +207,13 @@ class FamilySearch:
                 continue
             left, mid, right = np.log(np.maximum(window[peak - 1 : peak + 2], 1e-12))
             shift = 0.5 * (right - left) / max(2 * mid - left - right, 1e-9)
-            order = (index - 2 + peak + shift) * self._spectra.order_step
-            weight = number**2 * min(float(window[peak]), 100.0)
-            values += weight * order / number
-            weights += weight
-        return values / weights if weights > 0 else rough
+            order = (index - 2 + peak + shift) * self._spectra.order_step / number
+            peaks.append((number, order, float(window[peak])))
+        if not peaks:
+            return float(grid.fundamentals[at])
+        table = np.array(peaks)
+        weight = table[:, 0] ** 2 * table[:, 2] * (table[:, 2] >= _REFINE_SHARE * table[:, 2].max())
+        return float(np.sum(weight * table[:, 1]) / np.sum(weight))
 
     def _snr_db(self, grid: CombGrid, at: int, band: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
         ratio = self._ratio[band]

@@ -123,9 +123,12 @@ class _Tree:
 
     def nodes(self) -> Iterator[KurtogramNode]:
         square = self._x.astype(np.float64) ** 2
+        part = square.size // self._segments
+        second, fourth = _powers(square[: part * self._segments].reshape(self._segments, part))
+        segment = float(np.median(_excess(second, fourth))) - 1.0
         power = float(np.mean(square))
         whole = float(np.mean(square**2)) / max(power**2, 1e-300) - 3.0
-        yield KurtogramNode(0.0, 0.0, self._rate / 2, whole, power, whole)
+        yield KurtogramNode(0.0, 0.0, self._rate / 2, whole, power, segment)
         lines = sfft.fft(self._x)[np.newaxis]
         for level in range(1, self._levels + 1):
             parent = lines

@@ -20,6 +20,8 @@ SpeedSource = Literal["tacho", "encoder", "estimated", "nameplate"]
 _BOUNCE = 0.4
 _LOCAL_INTERVALS = 9
 _DOUBT = 0.25
+_END_PULSES = 8
+_END_AMPLIFICATION = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +152,7 @@ def phase_from_pulses(
     -----
     An interval below 0.4 of the local median is a bounce: its later pulse is dropped. An interval near a
     multiple of the local median has swallowed pulses: the angle is counted on by that multiple. Beyond the
-    first and last pulse the angle goes on at the mean of the last three intervals.
+    first and last pulse the angle goes on along the parabola through the eight pulses next to the end.
     """
     kept = np.asarray(pulse_samples, dtype=np.float64)
     kept, dropped = _without_bounces(kept)
@@ -170,7 +172,7 @@ def phase_from_pulses(
         notes.append(f"{missing} missing pulses filled in")
     if doubtful:
         notes.append(f"{doubtful} intervals fit no whole number of pulses")
-    samples, turns = _extended(kept, turns, per_pulse, counts, sample_count)
+    samples, turns = _extended(kept, turns, sample_count)
     return _Track(Phase(samples, turns), _jitter(per_pulse), ", ".join(notes))
 
 
@@ -196,24 +198,30 @@ def _local_median(intervals: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _extended(
-    samples: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    per_pulse: NDArray[np.float64],
-    counts: NDArray[np.float64],
-    sample_count: int,
+    samples: NDArray[np.float64], turns: NDArray[np.float64], sample_count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Knots at the window's ends too, at the speed of the three intervals next to them."""
+    """Knots at the window's ends too, so that the whole window has an angle."""
     end = float(sample_count - 1)
-    per_turn = (turns[1] - turns[0]) / counts[0]
     if samples[0] > 0:
-        rate = per_turn / np.mean(per_pulse[:3])
-        turns = np.concatenate(([turns[0] - samples[0] * rate], turns))
+        turns = np.concatenate(([_beyond(samples[:_END_PULSES], turns[:_END_PULSES], 0.0)], turns))
         samples = np.concatenate(([0.0], samples))
     if samples[-1] < end:
-        rate = per_turn / np.mean(per_pulse[-3:])
-        turns = np.concatenate((turns, [turns[-1] + (end - samples[-1]) * rate]))
+        turns = np.concatenate((turns, [_beyond(samples[-_END_PULSES:], turns[-_END_PULSES:], end)]))
         samples = np.concatenate((samples, [end]))
     return samples, turns
+
+
+def _beyond(samples: NDArray[np.float64], turns: NDArray[np.float64], at: float) -> float:
+    """The angle beyond the pulses: by a parabola where enough of them are near, else by a straight line."""
+    edge = 0 if at < samples[0] else -1
+    scale = float(samples[-1] - samples[0])
+    near = abs(at - samples[edge]) < 0.5 * scale
+    degree = 2 if samples.size >= 6 and near else 1
+    fit = np.polyfit((samples - samples[edge]) / scale, turns - turns[edge], degree)
+    fit[-1] = 0.0  # through the outermost pulse itself
+    value = float(turns[edge] + np.polyval(fit, (at - samples[edge]) / scale))
+    step = (at - samples[edge]) * (turns[-1] - turns[0]) / scale
+    return value if step * (value - turns[edge]) > 0 else float(turns[edge] + step)
 
 
 def _jitter(per_pulse: NDArray[np.float64]) -> float:
@@ -228,6 +236,7 @@ def _in_hz(track: _Track, sample_count: int, sample_rate_hz: float, source: Spee
     ends = np.interp([0.0, sample_count - 1.0], track.phase.samples, track.phase.turns)
     seconds = (sample_count - 1) / sample_rate_hz
     value = float(ends[1] - ends[0]) / seconds
-    half = 1.96 * np.sqrt(2.0) * track.jitter_samples / (sample_count - 1) * value
+    # The angle at the window's ends is extrapolated, which amplifies the pulses' jitter.
+    half = 1.96 * _END_AMPLIFICATION * np.sqrt(2.0) * track.jitter_samples / (sample_count - 1) * value
     half = max(half, 1e-9 * value)
     return ShaftSpeed(value, (value - half, value + half), source, track.phase, track.note)
