@@ -1,7 +1,8 @@
 """Synthetic signals with known answers: a local bearing defect as jittered impulses, and what disturbs it.
 
-The model is that of Antoni and Randall (J. Sound Vib. 308 (2007) 246-267): impacts at the fault's angle with a
-random walk of the period (slip), amplitudes modulated by the load zone, each ringing a resonance, in noise.
+The model is that of Antoni and Randall (J. Sound Vib. 308 (2007) 246-267): impacts at the fault's angle
+with a random walk of the period (slip), amplitudes modulated by the load zone, each ringing a resonance,
+in noise.
 """
 
 from __future__ import annotations
@@ -69,7 +70,9 @@ def defect(
     resonance_hz: float = 3500.0,
     damping: float = 0.05,
 ) -> Signal:
-    """Impulse responses at every 1 / order turns; the resonance's response has unit mean square per impact rate."""
+    """Impulse responses at every 1 / order turns; the resonance's response has unit mean square per impact
+    rate.
+    """
     count = int((turns[-1] - turns[0]) * order)
     steps = (1 + slip * rng.standard_normal(count)) / order
     at = turns[0] + rng.uniform(0, 1 / order) + np.cumsum(steps)

@@ -142,8 +142,7 @@ def test_a_weak_family_is_noted_but_not_found():
 
 @pytest.mark.parametrize("colour", [0.0, 0.8])
 def test_false_alarm_probability_is_calibrated(colour):
-    """On noise, p < alpha in at most a share alpha of the families judged, and not far below (three sigma).
-    """
+    """On noise, p < alpha in at most a share alpha of the families judged, and not far below (three sigma)."""
     plate = machine(tacho=True)
     values = []
     for seed in range(110):
