@@ -2,14 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
-from gearsim_sim.events import Event, FaultSpec
-from gearsim_sim.params import ParallelParams
+from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
+from gearsim_sim.integrate.decimate import HALF_LENGTH_SAMPLES, decimate, padded_taps
+from gearsim_sim.model.assembly import Vector
+from gearsim_sim.model.lpm34 import make_gearbox
+from gearsim_sim.params.parallel import ParallelParams
+from gearsim_sim.schedule import REBASE_STEPS, ActiveFault, Ramp, Schedule
+from gearsim_sim.stepper import Motion, Stepper
+from gearsim_sim.timeline import Timeline
+
+MIN_OVERSAMPLING, MAX_OVERSAMPLING = 2, 16
+# Below this rate of integration the scheme loses accuracy; slow sample rates get more steps per sample.
+MIN_STEP_RATE_HZ = 131072.0
+MIN_RATE_HZ, MAX_RATE_HZ = 100.0, 1e6
+SETTLING_S = 0.5
+_START_TURNS = 0.5  # so that whole turns of both shafts start from 0
+_BLOCK_SAMPLES = 512
+
+DEFAULT_SITES: dict[str, Vector] = {
+    f"b{number}_{axis}": {f"{axis}_p{number}": 1.0} for number in range(1, 5) for axis in "xy"
+}
+PROBE_NAMES = tuple(
+    f"{name}.{what}"
+    for name in (*(f"b{i}_x" for i in range(1, 5)), *(f"b{i}_y" for i in range(1, 5)), "mesh")
+    for what in ("displacement_m", "force_n")
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +49,7 @@ class EngineOutput:
     site_names: tuple[str, ...]
     accel: NDArray[np.float64]  # (sites, n) [m/s^2]
     shaft_names: tuple[str, ...]
-    turns: NDArray[np.int64]  # (shafts, n) whole turns since sample 0
+    turns: NDArray[np.int64]  # (shafts, n) whole turns of each shaft's encoder, from 0 on
     fraction: NDArray[np.float64]  # (shafts, n) rest of the angle in turns, [0, 1)
     speed_hz: NDArray[np.float64]  # (shafts, n) d(angle)/dt in turns per second
     probes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)  # name -> (n,)
@@ -38,16 +63,19 @@ class EngineOutput:
 class Engine:
     """Integrates the parallel-shaft gearbox; owns all dynamic state.
 
+    A run starts from static equilibrium at speed and settles for 0.5 s before sample 0. The output is
+    bitwise the same however it is split into calls, and depends on `seed` and the events only.
+
     Parameters
     ----------
     params : ParallelParams
         From `gearsim_sim.params.load_parallel_params`.
     seed : int
-        Of the gears' pitch and surface errors.
+        Of the gears' pitch and surface errors, >= 0.
     sample_rate_hz : float
-        Rate of the output samples.
+        Rate of the output samples, 100 Hz to 1 MHz.
     oversampling : int
-        Integration steps per output sample, 2 to 16.
+        Integration steps per output sample, 2 to 16. Low sample rates get more steps by themselves.
     faults : sequence of FaultSpec
         Present at full severity from the start.
     speed_hz, load_nm : float, optional
@@ -56,7 +84,13 @@ class Engine:
         Name of each site and its linear combination of degrees of freedom
         (`{"b3_y": {"y_p3": 1.0}}`); default: the eight pedestal sites b1_x, b1_y ... b4_y.
     probes : sequence of str
-        Further outputs, see `Engine.probe_names`.
+        Further outputs out of `PROBE_NAMES`: displacement of a bearing or of the mesh (without
+        transmission error), contact force of the shaft on the pedestal, force of the mesh.
+
+    Raises
+    ------
+    InputError
+        For anything out of its range, naming it.
     """
 
     def __init__(
@@ -69,32 +103,178 @@ class Engine:
         *,
         speed_hz: float | None = None,
         load_nm: float | None = None,
-        sites: Mapping[str, Mapping[str, float]] | None = None,
+        sites: Mapping[str, Vector] | None = None,
         probes: Sequence[str] = (),
-    ) -> None: ...
+    ) -> None:
+        _check_numbers(seed, sample_rate_hz, oversampling)
+        self.params = params
+        self.sample_rate_hz = float(sample_rate_hz)
+        self._steps = max(oversampling, math.ceil(MIN_STEP_RATE_HZ / sample_rate_hz))
+        self._gearbox = make_gearbox(params, seed)
+        self._timeline = Timeline(self._gearbox, self.sample_rate_hz, self._steps)
+        drive = params.model.drive
+        speed_hz = self._timeline.checked_speed(drive.speed_hz if speed_hz is None else speed_hz)
+        load_nm = self._timeline.checked_load(drive.load_nm if load_nm is None else load_nm)
+        self._sites = _checked_sites(
+            DEFAULT_SITES if sites is None else sites, self._gearbox.system.dof_names
+        )
+        self._probes = tuple(probes)
+        for name in self._probes:
+            if name not in PROBE_NAMES:
+                raise InputError("engine", "probes", name, "one of " + ", ".join(PROBE_NAMES))
+        self._prepare(speed_hz, load_nm, faults)
+        self._settle()
+
+    def _prepare(self, speed_hz: float, load_nm: float, faults: Sequence[FaultSpec]) -> None:
+        """Static equilibrium at the step where settling begins."""
+        step_s = 1.0 / (self.sample_rate_hz * self._steps)
+        first = -HALF_LENGTH_SAMPLES * self._steps - math.ceil(SETTLING_S / step_s)
+        turns = _START_TURNS + speed_hz * first * step_s
+        self._schedule = Schedule(self._gearbox, step_s, first, turns, speed_hz, load_nm)
+        for spec in faults:
+            spall = self._timeline.initial_spall(spec, first)
+            severity = Ramp(spall.severity, spall.severity)
+            self._schedule.faults[spec.name] = ActiveFault(spall, severity, first, 0.0)
+        probed = bool(self._probes)
+        self._stepper = Stepper(self._gearbox, self._schedule, self._sites, self._steps, probed=probed)
+        self._taps = padded_taps(self._steps)
+        columns = (2 * HALF_LENGTH_SAMPLES + _BLOCK_SAMPLES) * self._steps + self._taps.size
+        self._accel = np.zeros((len(self._sites), columns))
+
+    def _settle(self) -> None:
+        """Run up to the step before the one where the filter of sample 0 begins."""
+        self._motions: list[Motion] = []
+        self._next = 0
+        last = -HALF_LENGTH_SAMPLES * self._steps - 1
+        while True:
+            self._base_step = self._stepper.step + 1  # step of column 0
+            if self._stepper.step >= last:
+                break
+            self._integrate(min(last, self._stepper.step + _BLOCK_SAMPLES * self._steps))
+        self._motions.clear()
+        self._motion_sample = -HALF_LENGTH_SAMPLES
+
+    @property
+    def site_names(self) -> tuple[str, ...]:
+        """Names of the acceleration outputs, in order."""
+        return tuple(self._sites)
+
+    @property
+    def shaft_names(self) -> tuple[str, ...]:
+        """Names of the shafts whose encoders are put out."""
+        return (self.params.input_shaft, self.params.output_shaft)
 
     @property
     def next_sample(self) -> int:
         """Index of the first sample that the next `advance` returns."""
-        raise NotImplementedError
+        return self._next
+
+    @property
+    def lookahead_samples(self) -> int:
+        """How far the state runs ahead of the returned samples: half of the filter's length."""
+        return HALF_LENGTH_SAMPLES
 
     @property
     def earliest_event_sample(self) -> int:
         """Earliest `at_sample` that an event may have now.
 
-        The linear-phase filter looks `lookahead_samples` ahead of what it returns, so the state of
-        the samples before this one is history.
+        The linear-phase filter looks `lookahead_samples` ahead of what it returns, so the state at the
+        samples before this one is history.
         """
-        raise NotImplementedError
+        return max(0, -(-self._stepper.step // self._steps))
 
     @property
-    def lookahead_samples(self) -> int:
-        """How far the state runs ahead of the returned samples (about 25 at 4x)."""
-        raise NotImplementedError
+    def operating_point(self) -> tuple[float, float]:
+        """Speed [Hz] and load [N m] that the latest begun ramp leads to."""
+        return self._schedule.speed.end_value, self._schedule.load.end_value
+
+    def warm_up(self) -> None:
+        """Compile what is not yet compiled; the constructor has left only the filter to do."""
+        decimate(self._accel, 0, self._taps, self._steps, np.empty((len(self._sites), 1)), 0, 1)
 
     def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:
-        """The next `n` samples; `events` are scheduled first. The split into calls changes no bit."""
-        raise NotImplementedError
+        """The next `n` samples; `events` are scheduled first. The split into calls changes no bit.
+
+        Raises
+        ------
+        InputError
+            If an event is not acceptable.
+        FloatingPointError
+            If the motion is no longer finite, which no accepted input should bring about.
+        """
+        if n < 1:
+            raise InputError("engine", "n", n, "at least one sample")
+        for event in events:
+            self.schedule(event)
+        accel = np.empty((len(self._sites), n))
+        done = 0
+        while done < n:
+            count = min(n - done, _BLOCK_SAMPLES)
+            sample = self._next + done
+            self._integrate((sample + count - 1 + HALF_LENGTH_SAMPLES) * self._steps)
+            column = (sample - HALF_LENGTH_SAMPLES) * self._steps - self._base_step
+            decimate(self._accel, column, self._taps, self._steps, accel, done, count)
+            done += count
+        if not np.all(np.isfinite(accel)):
+            raise FloatingPointError(f"the motion became infinite before sample {self._next + n}")
+        return self._output(accel, self._take_motions(n))
+
+    def _output(self, accel: NDArray[np.float64], motion: Motion) -> EngineOutput:
+        first = self._next
+        self._next += accel.shape[1]
+        values = {
+            name: (motion.displacements if i % 2 == 0 else motion.forces)[i // 2]
+            for i, name in enumerate(PROBE_NAMES)
+            if name in self._probes
+        }
+        return EngineOutput(
+            first_sample=first,
+            site_names=self.site_names,
+            accel=accel,
+            shaft_names=self.shaft_names,
+            turns=motion.turns,
+            fraction=motion.fraction,
+            speed_hz=motion.speed_hz,
+            probes=values,
+        )
+
+    def _integrate(self, to_step: int) -> None:
+        """Advance to a step, stopping where something changes."""
+        self._make_room(to_step)
+        stepper = self._stepper
+        while stepper.step < to_step:
+            step = stepper.step
+            self._timeline.apply(self._schedule, step)
+            if step % REBASE_STEPS == 0:
+                self._schedule.rebase(step)
+            stop = min(to_step, (step // REBASE_STEPS + 1) * REBASE_STEPS)
+            if self._timeline.next_step is not None:
+                stop = min(stop, self._timeline.next_step)
+            self._motions.append(stepper.advance(stop - step, self._accel, step + 1 - self._base_step))
+
+    def _make_room(self, to_step: int) -> None:
+        """Move what the filter still needs to the front of the buffer when the end would be passed."""
+        width = self._accel.shape[1] - self._taps.size
+        if to_step - self._base_step < width:
+            return
+        keep_from = (self._next_kept()) * self._steps - HALF_LENGTH_SAMPLES * self._steps
+        shift = keep_from - self._base_step
+        used = self._stepper.step + 1 - self._base_step
+        self._accel[:, : used - shift] = self._accel[:, shift:used].copy()
+        self._base_step = keep_from
+
+    def _next_kept(self) -> int:
+        """First sample whose filter window is still needed: the one after the last that was complete."""
+        return max(self._stepper.step // self._steps - HALF_LENGTH_SAMPLES + 1, self._next)
+
+    def _take_motions(self, count: int) -> Motion:
+        """The states of the next `count` samples out of those gathered."""
+        parts = [[getattr(motion, name) for motion in self._motions] for name in Motion.__slots__]
+        joined = [np.concatenate(part, axis=1) for part in parts]
+        skip = self._next - self._motion_sample
+        self._motions = [Motion(*(array[:, skip + count :] for array in joined))]
+        self._motion_sample = self._next + count
+        return Motion(*(np.ascontiguousarray(array[:, skip : skip + count]) for array in joined))
 
     def set_operating_point(
         self,
@@ -103,17 +283,52 @@ class Engine:
         ramp_s: float = 1.0,
         at_sample: int | None = None,
     ) -> int:
-        """Schedule a change; returns the sample at which the ramp starts (None: the earliest possible)."""
-        raise NotImplementedError
+        """Schedule a change; returns the sample at which the ramp starts (None: the earliest possible).
+
+        The ramp has no jump of acceleration. It is lengthened to 10 ms, and where the drive's torque
+        would not do. None keeps the speed or load that the latest begun ramp leads to.
+        """
+        return self.schedule(SetOperatingPoint(speed_hz, load_nm, ramp_s, at_sample))
 
     def inject(self, fault: FaultSpec, ramp_s: float = 0.1, at_sample: int | None = None) -> int:
-        """Schedule a fault; returns the sample at which it starts to grow."""
-        raise NotImplementedError
+        """Schedule a fault; returns the sample at which it starts to grow (over 10 ms at least).
+
+        A fault that runs under the same name may be injected again with another severity only.
+        """
+        return self.schedule(Inject(fault, ramp_s, at_sample))
 
     def clear(self, fault_id: str = "", ramp_s: float = 0.1, at_sample: int | None = None) -> int:
         """Schedule the end of a fault (all if empty); returns the sample at which it starts to shrink."""
-        raise NotImplementedError
+        return self.schedule(Clear(fault_id, ramp_s, at_sample))
 
-    def warm_up(self) -> None:
-        """Compile everything (done by the constructor too)."""
-        raise NotImplementedError
+    def schedule(self, event: Event) -> int:
+        """Schedule any event; returns its sample.
+
+        Raises
+        ------
+        InputError
+            If its sample is history, or a value is out of range.
+        """
+        return self._timeline.add(event, self.earliest_event_sample)
+
+
+def _check_numbers(seed: int, sample_rate_hz: float, oversampling: int) -> None:
+    if seed < 0:
+        raise InputError("engine", "seed", seed, ">= 0")
+    if not MIN_RATE_HZ <= sample_rate_hz <= MAX_RATE_HZ:
+        expected = f"{MIN_RATE_HZ:g} to {MAX_RATE_HZ:g} Hz"
+        raise InputError("engine", "sample_rate_hz", sample_rate_hz, expected)
+    if not MIN_OVERSAMPLING <= oversampling <= MAX_OVERSAMPLING or oversampling != int(oversampling):
+        expected = f"a whole number from {MIN_OVERSAMPLING} to {MAX_OVERSAMPLING}"
+        raise InputError("engine", "oversampling", oversampling, expected)
+
+
+def _checked_sites(sites: Mapping[str, Vector], dofs: tuple[str, ...]) -> dict[str, Vector]:
+    if not sites:
+        raise InputError("engine", "sites", "none", "at least one site")
+    for name, vector in sites.items():
+        unknown = [dof for dof in vector if dof not in dofs]
+        if unknown or not any(vector.values()):
+            expected = "a combination of degrees of freedom out of " + ", ".join(dofs)
+            raise InputError("engine", f"sites.{name}", unknown or vector, expected)
+    return dict(sites)

@@ -107,6 +107,7 @@ class Drive(Strict):
     load_nm: Annotated[float, Si("N*m", ge=0), Field(alias="load")]
     speed_limit_hz: Annotated[float, Si("Hz", gt=0), Field(alias="speed_limit")]
     load_limit_nm: Annotated[float, Si("N*m", gt=0), Field(alias="load_limit")]
+    acceleration_torque_nm: Annotated[float, Si("N*m", gt=0), Field(alias="acceleration_torque")]
 
 
 class Physics(Strict):
@@ -155,7 +156,7 @@ class ParallelParams(Strict):
     physics: Physics = Physics()
 
     @property
-    def torque_ratio(self) -> float:
+    def speed_ratio(self) -> float:
         """Speed of the output shaft over that of the input shaft."""
         return self.mesh.driving_teeth / self.mesh.driven_teeth
 

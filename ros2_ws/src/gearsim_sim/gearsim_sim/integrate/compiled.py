@@ -1,0 +1,71 @@
+"""Compilation with numba, cached on disk where a writable place can be found.
+
+numba keys its cache by the source file of the function alone; a change in another file that is called
+from there would go unnoticed. So the cache folder carries a hash of all sources that are compiled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numba.core.config
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Sums may be reordered and multiply-adds fused, so that loops fill vector registers; NaN and infinity
+# keep their meaning. The order is fixed at compile time: one build gives the same bits at each call.
+FAST = {"reassoc", "contract", "nsz"}
+_ROOT = Path(__file__).parents[1]
+_FOLDERS = ("integrate", "model")
+
+
+def compiled(function: Function) -> Function:
+    """The function compiled, running without the interpreter's lock, cached on disk if possible."""
+    options: dict[str, Any] = {"nogil": True, "fastmath": FAST, "error_model": "numpy"}
+    folder = cache_folder()
+    if folder is None:
+        return cast(Function, numba.njit(**options)(function))
+    config: Any = numba.core.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder)  # read when the decorator runs
+    try:
+        return cast(Function, numba.njit(cache=True, **options)(function))
+    finally:
+        config.CACHE_DIR = before
+
+
+def inlined(function: Function) -> Function:
+    """A part of a compiled loop, copied into it: sizes that are constants there become constants here."""
+    return cast(Function, numba.njit(inline="always", fastmath=FAST, error_model="numpy")(function))
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Where compiled code is kept: below $XDG_CACHE_HOME or ~/.cache, else the temporary folder; or None."""
+    stamp = _source_hash()
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    user = f"gearsim-{os.getuid()}" if hasattr(os, "getuid") else "gearsim"
+    for base in (Path(home) / "gearsim", Path(tempfile.gettempdir()) / user):
+        folder = base / f"numba-{stamp}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+def _source_hash() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for name in _FOLDERS:
+        for path in sorted((_ROOT / name).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

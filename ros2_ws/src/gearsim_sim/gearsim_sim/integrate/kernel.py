@@ -1,0 +1,168 @@
+"""One step of the cubic exponential scheme, compiled: generic in the system, blind to what the forces are.
+
+A model's loop calls, for each step and each independent part of its system, `predict` and
+`interface_motion`, then its own force function, then `correct` and `site_accelerations`. All numbers of a
+part live in two flat arrays, `k` (constants) and `s` (state), so that the compiler sees that nothing
+overlaps. Sizes are arguments that must be compile-time constants of the calling loop (closure
+variables): `nm` modes (a multiple of LANES), `ni` interfaces, `nq` interface motions, `ns` sites.
+Layout, in units of doubles:
+
+    k: decay 2nm | c0 2nm | c1 2nm | c2 2nm | c3 2nm | left ni 2nm | rows (nq+ns) 2nm | compliance (nq+ns) ni
+    s: z 2nm | predicted z 2nm | force known now 2nm | forces of the last three instants 3 x 2nm
+       | rows nq+ns | interface motion nq | interface forces: now and the last two, 3 ni
+
+Complex numbers are split: nm real parts, then nm imaginary parts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_sim.integrate.coefficients import Propagator
+from gearsim_sim.integrate.compiled import inlined
+
+Array = NDArray[np.float64]
+
+
+def pack_constants(propagator: Propagator) -> Array:
+    """The array `k`."""
+    parts = (
+        propagator.decay,
+        propagator.weights,
+        propagator.left,
+        propagator.rows,
+        propagator.compliance,
+    )
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def pack_state(propagator: Propagator, z: Array, known: Array, forces: Array) -> Array:
+    """The array `s` for a start from rest: all forces have been as they are now."""
+    nm2, ni = 2 * propagator.modes, propagator.interfaces
+    modal = known + propagator.left.reshape(ni, nm2).T @ forces
+    rows = np.zeros(propagator.row_count + propagator.motions)
+    return np.concatenate([z, np.zeros(nm2), known, modal, modal, modal, rows, forces, forces, forces])
+
+
+@inlined
+def predict(s: Array, k: Array, nm: int) -> None:
+    """Mode coordinates at the next instant without the new interface forces."""
+    n2 = 2 * nm
+    for m in range(nm):
+        zr = s[m]
+        zi = s[nm + m]
+        real = k[m] * zr - k[nm + m] * zi
+        imag = k[m] * zi + k[nm + m] * zr
+        real += k[n2 + m] * s[2 * n2 + m] - k[n2 + nm + m] * s[2 * n2 + nm + m]
+        imag += k[n2 + m] * s[2 * n2 + nm + m] + k[n2 + nm + m] * s[2 * n2 + m]
+        real += k[2 * n2 + m] * s[3 * n2 + m] - k[2 * n2 + nm + m] * s[3 * n2 + nm + m]
+        imag += k[2 * n2 + m] * s[3 * n2 + nm + m] + k[2 * n2 + nm + m] * s[3 * n2 + m]
+        real += k[3 * n2 + m] * s[4 * n2 + m] - k[3 * n2 + nm + m] * s[4 * n2 + nm + m]
+        imag += k[3 * n2 + m] * s[4 * n2 + nm + m] + k[3 * n2 + nm + m] * s[4 * n2 + m]
+        real += k[4 * n2 + m] * s[5 * n2 + m] - k[4 * n2 + nm + m] * s[5 * n2 + nm + m]
+        imag += k[4 * n2 + m] * s[5 * n2 + nm + m] + k[4 * n2 + nm + m] * s[5 * n2 + m]
+        s[n2 + m] = real
+        s[n2 + nm + m] = imag
+
+
+@inlined
+def times_state(s: Array, k: Array, rows: int, count: int, length: int, n2: int, out: int) -> None:
+    """`count` rows of k (n2 long, from `rows` on) times the predicted mode coordinates, into s[out:].
+
+    `length` is n2 once more, but must not be a compile-time constant: the compiler would unroll short
+    rows into scalar code instead of filling vector registers. The mask tells it that the number is not
+    negative. Four rows at a time hide the latency of the sums.
+    """
+    n = length & 0xFFFF
+    for i in range(0, count - 3, 4):
+        t0 = 0.0
+        t1 = 0.0
+        t2 = 0.0
+        t3 = 0.0
+        for m in range(n):
+            v = s[n2 + m]
+            t0 += k[rows + i * n2 + m] * v
+            t1 += k[rows + (i + 1) * n2 + m] * v
+            t2 += k[rows + (i + 2) * n2 + m] * v
+            t3 += k[rows + (i + 3) * n2 + m] * v
+        s[out + i] = t0
+        s[out + i + 1] = t1
+        s[out + i + 2] = t2
+        s[out + i + 3] = t3
+    for i in range(count // 4 * 4, count):
+        total = 0.0
+        for m in range(n):
+            total += k[rows + i * n2 + m] * s[n2 + m]
+        s[out + i] = total
+
+
+@inlined
+def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int, ns: int) -> int:
+    """Output rows of the prediction, and the motion of the interfaces with extrapolated forces.
+
+    Returns where in `s` the motion starts: `nq` displacements (and rates, if the rows have them). The
+    new forces enter through the compliance of one step only, so their extrapolation by a parabola is
+    plenty: it is wrong by far less than the scheme.
+    """
+    n2 = 2 * nm
+    rows = 5 * n2 + ni * n2
+    comp = rows + (nq + ns) * n2
+    y = 6 * n2
+    q = y + nq + ns
+    g = q + nq
+    times_state(s, k, rows, nq + ns, length, n2, y)
+    for i in range(nq):
+        total = s[y + i]
+        for j in range(ni):
+            guess = 3.0 * (s[g + j] - s[g + ni + j]) + s[g + 2 * ni + j]
+            total += k[comp + i * ni + j] * guess
+        s[q + i] = total
+    return q
+
+
+@inlined
+def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: int, ns: int) -> None:
+    """Take the new interface forces, forces[at : at + ni], into the mode coordinates and the history."""
+    n2 = 2 * nm
+    left = 5 * n2
+    g = 6 * n2 + 2 * nq + ns
+    for m in range(nm):
+        s[5 * n2 + m] = s[4 * n2 + m]
+        s[5 * n2 + nm + m] = s[4 * n2 + nm + m]
+        s[4 * n2 + m] = s[3 * n2 + m]
+        s[4 * n2 + nm + m] = s[3 * n2 + nm + m]
+        real = 0.0
+        imag = 0.0
+        for i in range(ni):
+            real += k[left + i * n2 + m] * forces[at + i]
+            imag += k[left + i * n2 + nm + m] * forces[at + i]
+        s[m] = s[n2 + m] + (k[n2 + m] * real - k[n2 + nm + m] * imag)
+        s[nm + m] = s[n2 + nm + m] + (k[n2 + m] * imag + k[n2 + nm + m] * real)
+        s[3 * n2 + m] = s[2 * n2 + m] + real
+        s[3 * n2 + nm + m] = s[2 * n2 + nm + m] + imag
+    for i in range(ni):
+        s[g + 2 * ni + i] = s[g + ni + i]
+        s[g + ni + i] = s[g + i]
+        s[g + i] = forces[at + i]
+
+
+@inlined
+def site_acceleration(s: Array, k: Array, site: int, nm: int, ni: int, nq: int, ns: int) -> float:
+    """Acceleration of a site from the equation of motion, without what the known inputs give."""
+    n2 = 2 * nm
+    comp = 5 * n2 + ni * n2 + (nq + ns) * n2 + (nq + site) * ni
+    g = 6 * n2 + 2 * nq + ns
+    total: float = s[6 * n2 + nq + site]
+    for j in range(ni):
+        total += k[comp + j] * s[g + j]
+    return total
+
+
+@inlined
+def state_row(s: Array, row: Array, nm: int) -> float:
+    """One linear output of the mode coordinates, such as the angle of an encoder."""
+    total = 0.0
+    for m in range(2 * nm):
+        total += row[m] * s[m]
+    return total
