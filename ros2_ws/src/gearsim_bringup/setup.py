@@ -28,6 +28,10 @@ setup(
     ],
     # What runs without ROS; rclpy and the messages come with ROS, see package.xml.
     install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        "rosbags>=0.10",
+        "soundfile>=0.12",
         "click>=8.1",
         "rich>=13",
         "psutil>=5.9",
@@ -35,6 +39,8 @@ setup(
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",
     ],
+    # What `gearsim bench` compares with.
+    extras_require={"bench": ["PySDKit==0.5.0"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [
