@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from gearsim_sim.events import Clear, Event, Inject, SetOperatingPoint
 from gearsim_sim.scenario import Scenario
+from gearsim_sim.timeline import MIN_RAMP_S
 from gearsim_sim.truth import FaultTruth, GroundTruth, fault_parameters, version
 
 
@@ -81,7 +82,7 @@ class History:
         )
 
     def _samples(self, ramp_s: float) -> int:
-        return round(ramp_s * self._scenario.sample_rate_hz)
+        return max(1, round(max(ramp_s, MIN_RAMP_S) * self._scenario.sample_rate_hz))
 
 
 def _sample(event: Event) -> int:
