@@ -147,6 +147,13 @@ def test_equal_bearings_share_one_alarm_for_the_one_that_fits_best():
     ]
 
 
+def test_windows_that_are_surer_of_the_bearing_weigh_more():
+    unsure = replace(sign(30, "bearing_4", group="g"), confidence=0.5)
+    sure = replace(sign(30, "bearing_3", group="g"), confidence=0.6)
+    flat = [a for step in feed(book(), [(unsure,), (sure,)]) for a in step]
+    assert [a.component for a in flat] == ["bearing_3"]
+
+
 def test_an_alarm_moves_to_another_bearing_only_when_all_recent_windows_say_so():
     def row(name):
         return (sign(9, name, group="g"),)

@@ -311,9 +311,10 @@ def _significance(indication: Indication | None) -> float:
 
 
 def _best_component(slot: _Slot) -> str:
-    """The member of the group with the greatest sum of significances over the recent windows."""
-    sums: dict[str, float] = {}
+    """The member of the group with the most votes of the recent windows, each worth what it is sure of."""
+    votes: dict[str, float] = {}
     for indication in slot.recent:
         if indication is not None and indication.may_raise:
-            sums[indication.component] = sums.get(indication.component, 0.0) + indication.significance
-    return max(sorted(sums), key=lambda name: sums[name], default="")
+            weight = indication.significance * indication.confidence
+            votes[indication.component] = votes.get(indication.component, 0.0) + weight
+    return max(sorted(votes), key=lambda name: votes[name], default="")
