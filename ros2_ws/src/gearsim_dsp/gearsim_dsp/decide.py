@@ -219,21 +219,34 @@ def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], spee
 def _component(
     machine: Machine, group: _Group, judged: list[FamilyEvidence]
 ) -> tuple[FaultFamily, dict[str, float]]:
-    """Which of several like bearings: the one whose own channels carry most of the modulation."""
+    """Which of several like bearings it is."""
     if len(group.families) == 1:
         return group.first, {}
-    by_channel = {e.channel: e.amplitude for e in judged}
-    shares = {}
-    for family in group.families:
-        near = [by_channel[c] for c in machine.bearing(family.component).channels if c in by_channel]
-        shares[family.component] = float(np.mean(near)) if near else 0.0
-    total = sum(shares.values())
-    if total <= 0:
-        even = 1.0 / len(shares)
-        return group.first, dict.fromkeys(shares, even)
-    shares = {name: value / total for name, value in shares.items()}
+    shares = _shares(machine, group, judged)
     best = max(group.families, key=lambda f: shares[f.component])
     return best, shares
+
+
+def _shares(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> dict[str, float]:
+    """Share of each bearing in the modulation, the mean over all bands where it is clear counted in decibels.
+
+    What comes through the shaft and the casing from another bearing reaches a channel at low frequencies at
+    almost full strength and at high frequencies hardly at all; so each band has a say, and not the loudest.
+    """
+    levels = {e.channel: {b.band: b.amplitude for b in e.by_band} for e in judged}
+    common = set.intersection(*(set(bands) for bands in levels.values()))
+    clear = {b.band for e in judged for b in e.by_band if b.clear} & common
+    bands = sorted(clear or common, key=lambda band: band.low_hz)
+    mean: dict[str, float] = {}
+    for family in group.families:
+        near = [levels[c] for c in machine.bearing(family.component).channels if c in levels]
+        if near and bands:
+            loudest = [max(max(level[band] for level in near), 1e-300) for band in bands]
+            mean[family.component] = float(np.exp(np.mean(np.log(loudest))))
+    total = sum(mean.values())
+    if total <= 0:
+        return {f.component: 1.0 / len(group.families) for f in group.families}
+    return {f.component: mean.get(f.component, 0.0) / total for f in group.families}
 
 
 def _confidence(evidence: FamilyEvidence) -> float:

@@ -15,7 +15,7 @@ from gearsim_dsp.kinematics import FaultFamily
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
 from gearsim_dsp.speed import ShaftSpeed
 
-__all__ = ["FamilyEvidence", "FamilySearch"]
+__all__ = ["BandLevel", "FamilyEvidence", "FamilySearch"]
 
 _BLOCK_LINES = 160
 _SKIP_LINES = 4
@@ -26,6 +26,17 @@ _PLATEAU = 0.7
 _TOP_HARMONICS = 4
 _SIDEBANDS_EXPLAINED = 5
 _CELL_SHARE = 0.5  # independent looks per resolution cell of the 8th harmonic, counted on noise
+
+
+@dataclass(frozen=True, slots=True)
+class BandLevel:
+    """A family in one band: modulated power in the signal's unit squared, and whether its comb is
+    significant.
+    """
+
+    band: Band
+    amplitude: float
+    clear: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +61,8 @@ class FamilyEvidence:
         Mean square of the family's lines in the squared envelope over its squared mean (effect size).
     dominance : float
         The family's modulation over that of the strongest unrelated comb in the same band.
-    amplitude : float
-        Modulated power of all bands in the signal's unit squared, to compare channels.
+    by_band : tuple of BandLevel
+        The same band by band, to compare channels.
     windows : int
         Windows averaged.
     """
@@ -67,7 +78,7 @@ class FamilyEvidence:
     false_alarm_probability: float
     modulation: float
     dominance: float
-    amplitude: float
+    by_band: tuple[BandLevel, ...]
     windows: int
 
 
@@ -150,7 +161,7 @@ class FamilySearch:
             false_alarm_probability=p,
             modulation=float(modulation[band]),
             dominance=self._dominance(family, found, band, float(modulation[band])),
-            amplitude=float(np.sum(spectra.level * np.sqrt(2 * modulation))),
+            by_band=self._by_band(scores.score[:, best] - np.log(trials), modulation),
             windows=spectra.windows,
         )
 
@@ -181,6 +192,11 @@ class FamilySearch:
         index = np.unique(index[(index >= 0)])
         index = index[self._usable[index]]
         return np.asarray(2.0 * np.maximum(self._excess[:, index], 0.0).sum(axis=1))
+
+    def _by_band(self, score: NDArray[np.float64], modulation: NDArray[np.float64]) -> tuple[BandLevel, ...]:
+        amplitude = self._spectra.level * np.sqrt(2 * modulation)
+        rows = zip(self._spectra.bands, amplitude.tolist(), score[: modulation.size].tolist(), strict=True)
+        return tuple(BandLevel(band, level, value > _CLEAR) for band, level, value in rows)
 
     def _band(self, score: NDArray[np.float64], modulation: NDArray[np.float64], trials: float) -> int:
         """The band with the largest modulation among those where the comb itself is significant."""
