@@ -218,6 +218,8 @@ def test_a_line_for_people():
     line = " ".join(format_alarm(alarm).split())
     reason = "outer race of bearing_3: 48.9 Hz and 5 harmonics, 21 dB over the floor"
     assert line == f"0.50 s ERROR {reason} [envelope, b3_y]"
+    line = format_alarm(replace(alarm, t_ns=1795335447_690_000_000))
+    assert line.startswith("08:17:27.69 UTC  ERROR  outer race")
 
 
 @pytest.mark.parametrize(

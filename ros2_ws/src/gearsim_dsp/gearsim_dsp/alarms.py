@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 
 from gearsim_io.errors import InputError
 
@@ -20,6 +21,7 @@ __all__ = ["AlarmBook", "AlarmSettings", "Indication", "Judgement", "Thresholds"
 UNIT = "-log10 of the false-alarm probability"
 _TEN_MINUTES_S = 600.0
 _TEN_YEARS_S = 10 * 365.25 * 86400.0
+_SECONDS_OF_A_CALENDAR = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,9 +303,15 @@ class AlarmBook:
 
 
 def format_alarm(alarm: Alarm) -> str:
-    """One line for people: stream time, level, reason."""
-    word = alarm.level.name
-    return f"{alarm.t_ns / 1e9:10.2f} s  {word:<5}  {alarm.reason}  [{alarm.source}, {alarm.channel}]"
+    """One line for people: time of the stream, level, reason, who saw it where.
+
+    Stamps that are a time of day (the source counts from 1970) are shown as such, in UTC.
+    """
+    seconds = alarm.t_ns / 1e9
+    when = f"{seconds:10.2f} s"
+    if seconds > _SECONDS_OF_A_CALENDAR:
+        when = datetime.fromtimestamp(seconds, UTC).strftime("%H:%M:%S.%f")[:-4] + " UTC"
+    return f"{when}  {alarm.level.name:<5}  {alarm.reason}  [{alarm.source}, {alarm.channel}]"
 
 
 def _significance(indication: Indication | None) -> float:
