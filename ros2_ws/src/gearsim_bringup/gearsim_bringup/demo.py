@@ -95,12 +95,12 @@ class Demo:
 
     def _pictures(self, bag: Path, name: str) -> list[str]:
         """The rerun recording and, where the machine can draw, the picture."""
-        from gearsim_io.rerun_export import export_bag, export_png
+        from gearsim_io import rerun_export
 
         rrd, png = self._out / f"{name}.rrd", self._out / f"{name}.png"
-        export_bag(bag, rrd)
+        rerun_export.export(bag, rrd)
         try:
-            export_png(bag, png)
+            rerun_export.png(bag, png)
         except EnvironmentLackError as lack:
             self._voice.say(f"no picture: {lack}")
             return [str(rrd)]
