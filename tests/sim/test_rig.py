@@ -69,6 +69,11 @@ def test_what_the_machine_cannot_do_names_the_scenario(tmp_path):
     )
     with pytest.raises(InputError, match=r"bad\.yaml: .*component: got bearing_7, expected one of bearing_1"):
         Simulation(load_scenario(path))
+    path.write_text(
+        "operating_point: {speed: 10 Hz, load: 50 N*m}\nparameters: {shafts.bending_stiffness: 1 N/m}\n"
+    )
+    with pytest.raises(InputError, match=r"bad\.yaml: parameters: got .*that the model can be solved with"):
+        Simulation(load_scenario(path))
     path.write_text("operating_point: {speed: 400 Hz, load: 50 N*m}\n")
     with pytest.raises(InputError, match=r"bad\.yaml: .*speed.*400"):
         Simulation(load_scenario(path))

@@ -6,7 +6,8 @@ samples are asked for. `truth().events` of a live run is all that is needed to r
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
 import numpy as np
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
@@ -24,6 +25,7 @@ from gearsim_sim.sensors.rows import Encoder, Tacho
 from gearsim_sim.truth import GroundTruth
 from gearsim_sim.window import Window
 
+_T = TypeVar("_T")
 Batch = SampleBatch | TachoBatch | EncoderBatch
 
 
@@ -47,7 +49,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, t0_ns: int = 0, model: RunningModel | None = None) -> None:
         self.scenario = scenario
         self.t0_ns = t0_ns
-        self._model = _model_of(scenario) if model is None else model
+        self._model = model or _told(scenario, lambda: MODELS[scenario.model](scenario))
         self._history = History(scenario)
         for number, event in enumerate(scenario.events):
             try:
@@ -58,7 +60,7 @@ class Simulation:
         self._requested = 0
         self._sent = 0
         self._finished = False
-        first = self._model.advance(1)  # its sites and shafts are known from here on
+        first = _told(scenario, lambda: self._model.advance(1))  # tells sites and shafts
         self._chain = AccelerometerChain(
             scenario.sensors.accelerometers, first.site_names, scenario.sample_rate_hz, scenario.seed
         )
@@ -177,15 +179,20 @@ class Simulation:
         return batches
 
 
-def _model_of(scenario: Scenario) -> RunningModel:
+def _told(scenario: Scenario, act: Callable[[], _T]) -> _T:
+    """What `act` gives; what the physics refuses is told as a mistake in the scenario."""
     try:
-        return MODELS[scenario.model](scenario)
+        return act()
     except InputError as error:
         if scenario.source in error.where:
             raise
-        raise InputError(
-            f"{scenario.source}: {error.where}", error.field, error.value, error.expected
-        ) from None
+        where = f"{scenario.source}: {error.where}"
+        raise InputError(where, error.field, error.value, error.expected) from None
+    except (ValueError, ArithmeticError) as error:
+        if not scenario.parameters:
+            raise
+        expected = f"numbers that the model can be solved with ({error})"
+        raise InputError(scenario.source, "parameters", dict(scenario.parameters), expected) from None
 
 
 def simulate(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 
 from gearsim_io import qos
@@ -81,7 +82,10 @@ class Simulator(Node):
         goal = self._goal()
         due = pacer.due(self._now_s(), goal - pacer.made)
         if due and pacer.made + due == goal:
-            batches = simulation.advance(due)
+            try:
+                batches = simulation.advance(due)
+            except FloatingPointError as error:
+                return self._fail(str(error))
             pacer.add(due, self._now_s())
             if goal == self._end:
                 batches += simulation.finish()
@@ -89,6 +93,11 @@ class Simulator(Node):
             self._publisher.send(batches, simulation)
             goal = self._goal()
         return self._nap(pacer.seconds_until(goal, self._now_s()))
+
+    def _fail(self, text: str) -> None:
+        print(f"simulator: {text}", file=sys.stderr, flush=True)
+        self._health.report("pacing", Level.ERROR, text)
+        self.exit_status = 1
 
     def _goal(self) -> int:
         """Where the next step ends: a batch's end if that is near, the run's end in any case."""
