@@ -190,6 +190,8 @@ def test_status_in_words():
     assert pace_status(good, paused=False) == (Level.OK, "1 x real time")
     assert pace_status(good, paused=True) == (Level.OK, "paused")
     assert pace_status(fast, paused=False) == (Level.OK, "as fast as it goes: 11.80 x real time")
+    begun = PaceReport(lag_s=0.0, achieved=math.nan, wanted=0.0, slipped_s=0.0, keeping_up=True)
+    assert pace_status(begun, paused=False) == (Level.OK, "as fast as it goes")
     level, text = pace_status(slow, paused=False)
     assert level == Level.WARN
     assert text == "cannot keep up: 0.62 x real time in place of 1 x, 5.0 s behind"

@@ -219,7 +219,8 @@ def pace_status(pace: PaceReport, *, paused: bool) -> tuple[Level, str]:
     if paused:
         return Level.OK, "paused"
     if pace.wanted == 0:
-        return Level.OK, f"as fast as it goes: {pace.achieved:.2f} x real time"
+        known = "" if math.isnan(pace.achieved) else f": {pace.achieved:.2f} x real time"
+        return Level.OK, f"as fast as it goes{known}"
     if pace.keeping_up:
         return Level.OK, f"{pace.wanted:g} x real time"
     behind = pace.lag_s + pace.slipped_s
