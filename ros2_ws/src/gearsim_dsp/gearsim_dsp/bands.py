@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from gearsim_io.nameplate import Machine
+from scipy import fft as sfft
 
 from gearsim_dsp.kinematics import fault_families
 
@@ -95,7 +96,7 @@ def plan_bands(
     width = (ceiling - floor) / count
     bank = tuple(Band(floor + k * width, floor + (k + 1) * width, "bank") for k in range(count))
     top = min(_HARMONICS * max(f.order for f in families), 0.8 * width / plan_hz)
-    order_step = 0.5 / math.ceil(samples / sample_rate_hz * plan_hz)
+    order_step = 0.5 / sfft.next_fast_len(math.ceil(samples / sample_rate_hz * plan_hz), real=True)
     return BandPlan(bank, width, top, order_step, floor, ceiling, least_width), []
 
 

@@ -15,6 +15,7 @@ weight of resonances left alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from gearsim_io.errors import InputError
@@ -74,7 +75,7 @@ def window_spectrum(
     x = np.asarray(samples, dtype=np.float64)
     if x.ndim != 1 or x.size < 64:
         raise InputError("window_spectrum", "samples", f"shape {x.shape}", "a vector of 64 samples or more")
-    taper = tukey(x.size, 2 * _EDGE_SHARE).astype(np.float32)
+    taper = _taper(x.size)
     centred = ((x - np.mean(x)) * taper).astype(np.float32)
     return WindowSpectrum(sfft.rfft(centred), int(x.size), float(sample_rate_hz))
 
@@ -92,12 +93,24 @@ def suppress_lines(spectrum: WindowSpectrum, limit: float = _LINE_LIMIT) -> Wind
     return replace(spectrum, lines=spectrum.lines * factor.astype(np.float32))
 
 
+@lru_cache(maxsize=8)
+def _taper(samples: int) -> NDArray[np.float32]:
+    return np.asarray(tukey(samples, 2 * _EDGE_SHARE), dtype=np.float32)
+
+
+@lru_cache(maxsize=32)
+def _hann(samples: int) -> NDArray[np.float32]:
+    return np.asarray(np.hanning(samples + 1)[:-1], dtype=np.float32)
+
+
 def _local_median(values: NDArray[np.float32]) -> NDArray[np.float32]:
     blocks = max(1, values.size // _BLOCK_LINES)
     width = values.size // blocks
     medians = np.median(values[: blocks * width].reshape(blocks, width), axis=1)
-    centres = (np.arange(blocks) + 0.5) * width
-    return np.interp(np.arange(values.size), centres, medians).astype(np.float32)
+    local = np.empty_like(values)
+    local[: blocks * width].reshape(blocks, width)[:] = medians[:, np.newaxis]
+    local[blocks * width :] = medians[-1]
+    return local
 
 
 def squared_envelopes(spectrum: WindowSpectrum, lows_hz: NDArray[np.float64], width_hz: float) -> Envelopes:
@@ -178,14 +191,14 @@ def order_spectrum(
     lines = round(1.0 / order_step)
     if not 0 < span <= lines:
         raise InputError("order_spectrum", "order_step", order_step, f"at most {1 / span:g}")
-    per_turn = int(np.ceil(max(count / span, 2.5 * orders)))
+    per_turn = sfft.next_fast_len(int(np.ceil(max(count / span, 2.5 * orders))), real=True)
     grid = turns[0] + np.arange(int(span * per_turn)) / per_turn
     position = np.interp(grid, turns, np.arange(count, dtype=np.float64))
     left = np.minimum(position.astype(np.intp), count - 2)
     weight = (position - left).astype(np.float32)
     values = _normalised(envelopes.values)
     resampled = values[:, left] * (1 - weight) + values[:, left + 1] * weight
-    total = sfft.next_fast_len(lines * per_turn, real=True) if lines * per_turn < 64 else lines * per_turn
+    total = lines * per_turn
     power, _ = _spectrum(resampled - resampled.mean(axis=1, keepdims=True), total / resampled.shape[1])
     return power[:, : int(orders / order_step) + 1]
 
@@ -197,7 +210,7 @@ def _normalised(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _spectrum(values: NDArray[np.float32], padding: float) -> tuple[NDArray[np.float64], int]:
     count = values.shape[1]
-    window = np.hanning(count + 1)[:-1].astype(np.float32)
+    window = _hann(count)
     length = round(count * padding)
     lines = sfft.rfft(values * window, n=length, axis=1)
     power = (lines.real.astype(np.float64) ** 2 + lines.imag.astype(np.float64) ** 2) / np.sum(window) ** 2

@@ -60,7 +60,8 @@ class FamilyEvidence:
     modulation : float
         Mean square of the family's lines in the squared envelope over its squared mean (effect size).
     dominance : float
-        The family's modulation over that of the strongest unrelated comb in the same band.
+        The family's modulation over that of the strongest unrelated comb in the same band; 0 where the
+        false-alarm probability is above 0.01 anyway.
     by_band : tuple of BandLevel
         The same band by band, to compare channels.
     windows : int
@@ -160,7 +161,7 @@ class FamilySearch:
             snr_db=max(harmonics[:4], default=float("nan")),
             false_alarm_probability=p,
             modulation=float(modulation[band]),
-            dominance=self._dominance(family, found, band, float(modulation[band])),
+            dominance=self._dominance(family, found, band, float(modulation[band])) if p < 0.01 else 0.0,
             by_band=self._by_band(scores.score[:, best] - np.log(trials), modulation),
             windows=spectra.windows,
         )

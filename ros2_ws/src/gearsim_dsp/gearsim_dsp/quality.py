@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 __all__ = ["QualityIssue", "check_samples"]
 
-_CLIP_RUN = 3
+_CLIP_COUNT = 10
 _CLIP_SHARE = 1e-4
+_CLIP_MARGIN = 0.01
+_CLIP_EXCESS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +47,10 @@ def check_samples(
     Returns
     -------
     tuple of QualityIssue
-        "not_finite", "constant_channel" and "too_short" are fatal; "clipping" (the extreme value held for
-        three samples or more, again and again) and "dropout" (one value held for long stretches) are not.
+        "not_finite", "constant_channel" and "too_short" are fatal; "clipping" (far more samples at an extreme
+        than just below it) and "dropout" (one value held for a long stretch) are not.
     """
-    x = np.asarray(samples)
+    x: NDArray[np.floating] = np.asarray(samples)
     finite = np.isfinite(x)
     if not finite.all():
         bad = int(x.size - np.count_nonzero(finite))
@@ -60,9 +62,9 @@ def check_samples(
     if low == high:
         return (QualityIssue("constant_channel", channel, f"all samples are {low:g}", True),)
     issues = []
-    clipped = _held(x == high) + _held(x == low)
-    if clipped > max(_CLIP_SHARE * x.size, 2 * _CLIP_RUN):
-        detail = f"{clipped} of {x.size} samples sit at the extremes {low:.4g} and {high:.4g} in runs"
+    clipped = _piled(x, high, high - low) + _piled(-x, -low, high - low)
+    if clipped:
+        detail = f"{clipped} of {x.size} samples sit at the extremes {low:.4g} and {high:.4g}"
         issues.append(QualityIssue("clipping", channel, detail))
     held = _longest_run(x[1:] == x[:-1]) + 1
     if held > max(64, x.size // 2000) and not clipped:
@@ -70,12 +72,11 @@ def check_samples(
     return tuple(issues)
 
 
-def _held(at: NDArray[np.bool_]) -> int:
-    """Number of samples in runs of at least _CLIP_RUN."""
-    if np.count_nonzero(at) < _CLIP_RUN:
-        return 0
-    lengths = _runs(at)
-    return int(lengths[lengths >= _CLIP_RUN].sum())
+def _piled(x: NDArray[np.floating], top: float, span: float) -> int:
+    """Samples at the top value, if they are many and far more than in the hundredth of the range below it."""
+    at = int(np.count_nonzero(x >= top))
+    below = int(np.count_nonzero(x >= top - _CLIP_MARGIN * span)) - at
+    return at if at >= max(_CLIP_COUNT, _CLIP_SHARE * x.size) and at > _CLIP_EXCESS * below else 0
 
 
 def _longest_run(at: NDArray[np.bool_]) -> int:

@@ -23,7 +23,7 @@ __all__ = ["estimate_speed", "shaft_line_orders"]
 
 _SHAFT_HARMONICS = 8
 _MESH_HARMONICS = 3
-_LINE_CAP = 10.0
+_LINE_CAP = 25.0
 _BLOCK_LINES = 64
 _TEMPER_DB = 4.0
 _LINE_WIDTH = 0.25
@@ -75,8 +75,10 @@ def estimate_speed(
     values = _match(position, peaks, heights) * inside
     score = values.sum(axis=1)
     best = int(np.argmax(score))
-    total = float(np.sum(_match(position[best], peaks, tails) * inside[best]))
-    p = float(comb_false_alarm(total, int(np.count_nonzero(inside[best])))) * candidates.size
+    tail = _match(position[best], peaks, tails) * inside[best]
+    # Without its strongest line, for one line alone is no comb.
+    rest = int(np.count_nonzero(inside[best])) - 1
+    p = float(comb_false_alarm(tail.sum() - tail.max(), rest)) * candidates.size
     if p > _FALSE_ALARM:
         return nameplate_speed(machine, "no shaft lines stand out of the noise")
     if _rival(score, candidates, candidates[best]) > _RIVAL * score[best]:
@@ -90,16 +92,22 @@ def estimate_speed(
 def _line_evidence(
     power: Sequence[NDArray[np.float64]], averages: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """-ln p (capped) and height over the floor in dB (clipped) of every line, averaged over the channels."""
+    """-ln p (capped) and height over the floor in dB (clipped) of every line, on the channel that shows
+    it best.
+
+    The best of several channels is so much higher by chance; that is taken off.
+    """
     lines = min(p.size for p in power)
     tail = LineTail(averages, averages * 0.45 * _BLOCK_LINES)
-    evidence, prominence = np.zeros(lines), np.zeros(lines)
+    best = np.zeros(lines)
     for spectrum in power:
         cut = np.asarray(spectrum[:lines], dtype=np.float64)
-        ratio = cut / np.maximum(local_floor(cut, _BLOCK_LINES, averages, 2), np.finfo(np.float64).tiny)
-        evidence += np.minimum(tail(ratio), _LINE_CAP)
-        prominence += np.clip(10 * np.log10(np.maximum(ratio, 1e-3)), 0.0, _TOP_DB)
-    return evidence / len(power), prominence / len(power)
+        floor = np.maximum(local_floor(cut, _BLOCK_LINES, averages, 2), np.finfo(np.float64).tiny)
+        best = np.maximum(best, cut / floor)
+    chance = np.log(len(power))
+    evidence = np.clip(tail(best) - chance, 0.0, _LINE_CAP)
+    height = 10 * np.log10(np.maximum(best / (1.0 + chance / averages), 1e-3))
+    return evidence, np.clip(height, 0.0, _TOP_DB)
 
 
 def _peaks(
