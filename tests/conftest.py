@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 SOURCES = Path(__file__).resolve().parents[1] / "ros2_ws" / "src"
-for _package in ("gearsim_bringup", "gearsim_dsp", "gearsim_sim", "gearsim_io"):
-    _folder = str(SOURCES / _package)
-    if _folder not in sys.path[:4]:
-        sys.path.insert(0, _folder)  # the sources are tested, not an older build of them
+_FOLDERS = [str(SOURCES / name) for name in ("gearsim_io", "gearsim_sim", "gearsim_dsp", "gearsim_bringup")]
+# The sources are tested, not an older build of them; also in child processes.
+sys.path[:0] = _FOLDERS
+os.environ["PYTHONPATH"] = os.pathsep.join([*_FOLDERS, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
 
 from rosproc import RosDomain, reserved_domain  # noqa: E402
 

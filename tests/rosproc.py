@@ -130,9 +130,6 @@ class RosDomain:
     def __init__(self, domain: int, log_folder: Path) -> None:
         self.id = domain
         self.env = dict(os.environ)
-        self.env["PYTHONPATH"] = os.pathsep.join(
-            [*(entry for entry in sys.path if "ros2_ws" in entry), self.env.get("PYTHONPATH", "")]
-        )
         self.env.update(
             ROS_DOMAIN_ID=str(domain),
             ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",

@@ -10,9 +10,11 @@ import struct
 from typing import NamedTuple
 
 SAMPLE_BATCH = "gearsim_msgs/msg/SampleBatch"
-ANGLE_BATCHES = ("gearsim_msgs/msg/TachoBatch", "gearsim_msgs/msg/EncoderBatch")
+TACHO_BATCH = "gearsim_msgs/msg/TachoBatch"
+ANGLE_BATCHES = (TACHO_BATCH, "gearsim_msgs/msg/EncoderBatch")
 BATCHES = (SAMPLE_BATCH, *ANGLE_BATCHES)
 _ENCAPSULATION = 4
+_TO_SHAFT = 20  # behind sample_rate, first_sample and the number of samples
 
 
 class Position(NamedTuple):
@@ -27,18 +29,46 @@ class Position(NamedTuple):
 def position(data: bytes, type_name: str) -> Position | None:
     """The place of a serialised batch (one of `BATCHES`) in its stream; None if it is no such message."""
     try:
-        order = "<" if data[1] & 1 else ">"
-        (length,) = struct.unpack_from(f"{order}I", data, _ENCAPSULATION + 8)
-        at = _ENCAPSULATION + 12 + length
-        at += -(at - _ENCAPSULATION) % 8
+        order, at = _behind_header(data)
         rate_hz, first, count = struct.unpack_from(f"{order}dQI", data, at)
         shaft = ""
         if type_name in ANGLE_BATCHES:
-            (length,) = struct.unpack_from(f"{order}I", data, at + 20)
-            shaft = bytes(data[at + 24 : at + 24 + length - 1]).decode()
+            (length,) = struct.unpack_from(f"{order}I", data, at + _TO_SHAFT)
+            shaft = bytes(data[at + _TO_SHAFT + 4 : at + _TO_SHAFT + 4 + length - 1]).decode()
     except (struct.error, IndexError, UnicodeDecodeError):
         return None
     return Position(rate_hz, first, count, shaft)
+
+
+def without_padding(data: bytes, type_name: str) -> bytes:
+    """An angle batch without what Fast CDR appends to an empty list of doubles.
+
+    It is four bytes of memory that mean nothing, and the `rosbags` library (0.11) refuses a message that
+    goes on behind its end. All other messages are given back as they are.
+    """
+    if type_name not in ANGLE_BATCHES:
+        return data
+    try:
+        order, at = _behind_header(data)
+        (length,) = struct.unpack_from(f"{order}I", data, at + _TO_SHAFT)
+        at += _TO_SHAFT + 4 + length
+        # pulses_per_revolution and first_pulse, or (after a 4-byte number of lines) first_edge
+        at = _aligned(at, 8) + 16 if type_name == TACHO_BATCH else _aligned(_aligned(at, 4) + 4, 8) + 8
+        (offsets,) = struct.unpack_from(f"{order}I", data, at)
+    except (struct.error, IndexError):
+        return data
+    return data if offsets else data[: at + 4]
+
+
+def _behind_header(data: bytes) -> tuple[str, int]:
+    """Byte order, and the place of the field behind the header, which is a double."""
+    order = "<" if data[1] & 1 else ">"
+    (length,) = struct.unpack_from(f"{order}I", data, _ENCAPSULATION + 8)
+    return order, _aligned(_ENCAPSULATION + 12 + length, 8)
+
+
+def _aligned(at: int, size: int) -> int:
+    return at + -(at - _ENCAPSULATION) % size
 
 
 class GapCounter:

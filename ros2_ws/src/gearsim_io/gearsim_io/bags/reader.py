@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 
-from gearsim_io import definitions
+from gearsim_io import cdr, definitions
 from gearsim_io.bags.layout import BagError, TopicInfo, Totals, bag_files, parse_qos
 from gearsim_io.errors import InputError
 
@@ -148,8 +148,9 @@ def decode(message: BagMessage) -> Any:
     from rosbags.serde import SerdeError
 
     definitions.definition(message.type)  # teaches the store types of installed packages
+    data = cdr.without_padding(message.data, message.type)
     try:
-        return definitions.typestore().deserialize_cdr(message.data, message.type)
+        return definitions.typestore().deserialize_cdr(data, message.type)
     except (SerdeError, AssertionError, IndexError) as error:
         raise InputError(
             f"topic {message.topic}", "", str(error), f"a message of type {message.type}"

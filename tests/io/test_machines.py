@@ -1,0 +1,196 @@
+"""Machine descriptions: what is shipped is right, what is wrong is told with file, key, value."""
+
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+
+import pytest
+from gearsim_io.errors import InputError
+from gearsim_io.machines import load_machine, machine_file, machine_names
+from ruamel.yaml import YAML
+
+NAMES = ("cwru_drive_end", "gear0", "hit_sq", "mfpt", "sq_gearbox", "unsw_parallel", "wt_hss")
+
+
+def orders(bearing):
+    """BPFO, BPFI, BSF, FTF of a bearing, by the textbook."""
+    slope = bearing.element_diameter_m / bearing.pitch_diameter_m * math.cos(bearing.contact_angle_rad)
+    n = bearing.rolling_elements
+    spin = (1 - slope**2) / slope * math.cos(bearing.contact_angle_rad) / 2
+    return n / 2 * (1 - slope), n / 2 * (1 + slope), spin, (1 - slope) / 2
+
+
+def test_all_names_are_shipped_and_load():
+    assert set(NAMES) <= set(machine_names())
+    for name in machine_names():
+        machine = load_machine(name)
+        assert machine.name == name
+        assert machine.description
+        assert machine.sources, "every number has a source"
+        assert all(text.strip() for text in machine.sources.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "bearing", "published"),
+    [
+        # Orders that the publishers of the data state for their bearings.
+        ("mfpt", "test_bearing", (3.245, 4.755, 2.5564, 0.4056)),
+        ("cwru_drive_end", "drive_end", (3.5848, 5.4152, 2.3567, 0.39828)),
+        ("hit_sq", "test_bearing", (3.5848, 5.4152, 2.3567, 0.39828)),
+        ("unsw_parallel", "bearing_3", (4.8904, 7.1096, 2.6112, 0.40753)),
+    ],
+)
+def test_bearings_have_the_published_orders(name, bearing, published):
+    assert orders(load_machine(name).bearing(bearing)) == pytest.approx(published, rel=8e-4)
+
+
+def test_unsw_rig_as_in_the_thesis():
+    machine = load_machine("unsw_parallel")
+    assert [b.shaft for b in machine.bearings] == ["input", "input", "output", "output"]
+    assert machine.shaft("output").ratio == 1.0
+    assert machine.nominal_speed_hz == 10.0
+    assert {c.name for c in machine.channels} == {f"b{n}_{axis}" for n in range(1, 5) for axis in "xy"}
+    # Thesis 5.5: BPFO 48.8 Hz and BPFI 71.1 Hz at 10 Hz.
+    bpfo, bpfi, *_ = orders(machine.bearing("bearing_3"))
+    assert 10 * bpfo == pytest.approx(48.8, abs=0.15)
+    assert 10 * bpfi == pytest.approx(71.1, abs=0.05)
+
+
+def test_ratios_follow_from_the_teeth():
+    machine = load_machine("sq_gearbox")
+    assert machine.shaft("intermediate").ratio == pytest.approx(32 / 80)
+    assert machine.shaft("output").ratio == pytest.approx(32 / 80 * 48 / 64)
+    assert machine.shaft("output").nominal_speed_hz == pytest.approx(9.0)
+    turbine = load_machine("wt_hss")
+    assert turbine.shaft("intermediate").ratio == pytest.approx(22 / 121)
+    assert math.isnan(turbine.nominal_speed_hz)
+
+
+def number(value, unit="1"):
+    return {"value": value, "unit": unit, "source": "test"}
+
+
+GOOD = {
+    "name": "toy",
+    "description": "A toy",
+    "nameplate": {
+        "reference_shaft": "in",
+        "shafts": {"in": {"nominal_speed": number(1500, "rpm")}, "out": {}},
+        "gear_meshes": {
+            "pair": {
+                "driving_shaft": "in",
+                "driven_shaft": "out",
+                "driving_teeth": number(20),
+                "driven_teeth": number(40),
+            }
+        },
+        "bearings": {
+            "b1": {
+                "shaft": "in",
+                "rolling_elements": number(9),
+                "element_diameter": number(7.94, "mm"),
+                "pitch_diameter": number(39.04, "mm"),
+                "contact_angle": number(10, "deg"),
+                "channels": ["a"],
+            }
+        },
+        "channels": {"a": {}},
+    },
+}
+
+
+def write(tmp_path, content, name="toy.yaml"):
+    path = tmp_path / name
+    with open(path, "w") as stream:
+        YAML().dump(content, stream)
+    return path
+
+
+def changed(place, value):
+    content = deepcopy(GOOD)
+    *path, last = place.split("/")
+    inner = content
+    for key in path:
+        inner = inner[key]
+    if value is None:
+        del inner[last]
+    else:
+        inner[last] = value
+    return content
+
+
+def test_units_become_si(tmp_path):
+    machine = load_machine(write(tmp_path, GOOD))
+    assert machine.nominal_speed_hz == pytest.approx(25.0)
+    bearing = machine.bearing("b1")
+    assert bearing.element_diameter_m == pytest.approx(7.94e-3)
+    assert bearing.contact_angle_rad == pytest.approx(math.radians(10))
+    assert machine.shaft("out").ratio == 0.5
+    assert machine.sources["bearings.b1.pitch_diameter"] == "test"
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "field", "words"),
+    [
+        ("name", None, "name", "this key"),
+        ("color", "red", "color", "no such key"),
+        ("nameplate/shafts", {}, "nameplate.shafts", "at least 1"),
+        ("nameplate/reference_shaft", "motor", "nameplate.reference_shaft", "one of the shafts in, out"),
+        ("nameplate/bearings/b1/shaft", "x", "nameplate.bearings.b1.shaft", "one of the shafts in, out"),
+        ("nameplate/bearings/b1/channels", ["z"], "nameplate.bearings.b1.channels.0", "channels a"),
+        ("nameplate/bearings/b1/rolling_elements", number(2), "rolling_elements", ">= 3"),
+        ("nameplate/bearings/b1/rolling_elements", number(9.5), "rolling_elements", "a whole number"),
+        ("nameplate/bearings/b1/rolling_elements", number(16), "rolling_elements", "fit on a pitch circle"),
+        (
+            "nameplate/bearings/b1/element_diameter",
+            number(50, "mm"),
+            "element_diameter",
+            "less than the pitch",
+        ),
+        ("nameplate/bearings/b1/element_diameter", number(7.94, "kg"), "element_diameter", "not kg"),
+        ("nameplate/bearings/b1/element_diameter", 0.00794, "element_diameter", "source"),
+        ("nameplate/bearings/b1/pitch_diameter", {"value": 39, "unit": "mm"}, "pitch_diameter", "source"),
+        ("nameplate/bearings/b1/pitch_diameter", number(-1, "mm"), "pitch_diameter", "> 0"),
+        ("nameplate/bearings/b1/contact_angle", number(95, "deg"), "contact_angle", "< 1.57"),
+        ("nameplate/gear_meshes/pair/driven_shaft", "in", "gear_meshes.pair.driven_shaft", "another shaft"),
+        ("nameplate/gear_meshes/pair/driven_teeth", number(0), "driven_teeth", ">= 1"),
+        (
+            "nameplate/gear_meshes/pair/driven_shaft",
+            "no",
+            "gear_meshes.pair.driven_shaft",
+            "one of the shafts",
+        ),
+        ("nameplate/shafts/out", {"ratio": number(0.4)}, "nameplate.shafts.out.ratio", "0.5, by the teeth"),
+        ("nameplate/shafts/in", {"ratio": number(2)}, "nameplate.shafts.in.ratio", "the reference shaft"),
+        ("nameplate/shafts/lost", {}, "nameplate.shafts.lost.ratio", "no gear mesh joins"),
+        ("nameplate/shafts/in", {"nominal_speed": number(-5, "Hz")}, "nominal_speed", "> 0"),
+        ("nameplate/tacho_shafts", ["x"], "nameplate.tacho_shafts.0", "one of the shafts"),
+        ("nameplate/encoder_shafts", ["x"], "nameplate.encoder_shafts.0", "one of the shafts"),
+        ("nameplate/speed_tolerance", number(1.5), "speed_tolerance", "< 1"),
+    ],
+)
+def test_bad_descriptions_are_named(tmp_path, place, value, field, words):
+    path = write(tmp_path, changed(place, value))
+    with pytest.raises(InputError) as caught:
+        load_machine(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert field in message
+    assert words in message
+    assert "\n" not in message
+
+
+def test_unreadable_files_are_named(tmp_path):
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("name: [")
+    with pytest.raises(InputError, match="valid YAML"):
+        load_machine(broken)
+    listed = tmp_path / "list.yaml"
+    listed.write_text("- 1\n- 2\n")
+    with pytest.raises(InputError, match="a mapping"):
+        load_machine(listed)
+    with pytest.raises(InputError, match="one of cwru_drive_end"):
+        machine_file("no_such_machine")
+    with pytest.raises(InputError, match=r"no_such\.yaml"):
+        machine_file(tmp_path / "no_such.yaml")
