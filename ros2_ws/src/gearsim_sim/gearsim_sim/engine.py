@@ -124,6 +124,7 @@ class Engine:
                 raise InputError("engine", "probes", name, "one of " + ", ".join(PROBE_NAMES))
         self._prepare(speed_hz, load_nm, faults)
         self._settle()
+        self.warm_up()
 
     def _prepare(self, speed_hz: float, load_nm: float, faults: Sequence[FaultSpec]) -> None:
         """Static equilibrium at the step where settling begins."""
@@ -189,7 +190,7 @@ class Engine:
         return self._schedule.speed.end_value, self._schedule.load.end_value
 
     def warm_up(self) -> None:
-        """Compile what is not yet compiled; the constructor has left only the filter to do."""
+        """Compile everything that `advance` uses; the constructor has done so already."""
         decimate(self._accel, 0, self._taps, self._steps, np.empty((len(self._sites), 1)), 0, 1)
 
     def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:

@@ -131,9 +131,9 @@ class Schedule:
     def grow(self, step: int, name: str, spall: Spall, ramp_steps: float) -> None:
         """Let a fault's severity go from what it is to that of `spall`.
 
-        If a fault of that name but of another geometry is still fading, it goes on fading beside.
+        If a fault of that name but of another geometry is still fading, it goes on fading beside. The
+        anchor stays: a fault of severity zero must not change a bit.
         """
-        self.rebase(step)
         old = self.faults.get(name)
         if old is not None and replace(old.spall, severity=spall.severity) != spall:
             self.faults[f"{name} until {old.start_step + int(old.ramp_steps)}"] = self.faults.pop(name)

@@ -22,6 +22,8 @@ from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.schedule import Schedule
 
 Array = NDArray[np.float64]
+# Bearings with fewer balls share the compiled loop of those with so many.
+_LEAST_BALLS = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +86,7 @@ class Stepper:
         y = _set_up(system, y_names, matrix, schedule.step_s, _y_rows(gearbox, probed))
         self._data = _loop_data(gearbox, x.part, y.part, schedule.step_s, oversampling)
         balls = self._data.cosines.shape[1]
-        self._loop = make_loop(
-            x.propagator.modes, x.propagator.sites, y.propagator.modes, y.propagator.sites, balls
-        )
+        self._loop = make_loop(x.propagator.modes, y.propagator.modes, balls)
         self._missing = np.zeros((4, balls))
         self._state = self._rest(x, y)
 
@@ -201,7 +201,7 @@ def _set_up(
 def _loop_data(gearbox: Gearbox, x: Part, y: Part, step_s: float, oversampling: int) -> Data:
     """Constants of the force elements for the loop."""
     params, mesh, bearings = gearbox.params, gearbox.mesh, gearbox.bearings
-    balls = padded(max(bearing.ball_count for bearing in bearings))
+    balls = padded(max(_LEAST_BALLS, *(bearing.ball_count for bearing in bearings)))
     cosines, sines = np.zeros((4, balls)), np.zeros((4, balls))
     row_offsets = np.zeros((4, 2))
     for i, bearing in enumerate(bearings):

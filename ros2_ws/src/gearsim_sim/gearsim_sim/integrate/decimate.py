@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin
 
 from gearsim_sim.integrate.compiled import compiled
 
@@ -25,9 +24,9 @@ _BLOCK = 32
 
 def decimation_taps(oversampling: int) -> Array:
     """Filter taps at the rate of integration, 54 `oversampling` + 1 of them; their sum is one."""
-    count = 2 * HALF_LENGTH_SAMPLES * oversampling + 1
-    taps = firwin(count, 1.0, window=("kaiser", _KAISER_BETA), fs=2.0 * oversampling)
-    return np.asarray(taps, dtype=np.float64)
+    half = HALF_LENGTH_SAMPLES * oversampling
+    taps = np.sinc(np.arange(-half, half + 1) / oversampling) * np.kaiser(2 * half + 1, _KAISER_BETA)
+    return np.asarray(taps / taps.sum())
 
 
 def padded_taps(oversampling: int) -> Array:

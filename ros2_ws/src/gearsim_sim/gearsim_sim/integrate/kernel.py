@@ -3,13 +3,14 @@
 A model's loop calls, for each step and each independent part of its system, `predict` and
 `interface_motion`, then its own force function, then `correct` and `site_accelerations`. All numbers of a
 part live in two flat arrays, `k` (constants) and `s` (state), so that the compiler sees that nothing
-overlaps. Sizes are arguments that must be compile-time constants of the calling loop (closure
-variables): `nm` modes (a multiple of LANES), `ni` interfaces, `nq` interface motions, `ns` sites.
+overlaps. Sizes must be compile-time constants of the calling loop (closure variables): `nm` modes (a
+multiple of LANES), `ni` interfaces, `nq` interface motions; only the number of sites may vary.
 Layout, in units of doubles:
 
-    k: decay 2nm | c0 2nm | c1 2nm | c2 2nm | c3 2nm | left ni 2nm | rows (nq+ns) 2nm | compliance (nq+ns) ni
+    k: decay 2nm | c0 2nm | c1 2nm | c2 2nm | c3 2nm | left ni 2nm
+       | motions: rows nq 2nm, compliance nq ni | sites: rows ns 2nm, compliance ns ni
     s: z 2nm | predicted z 2nm | force known now 2nm | forces of the last three instants 3 x 2nm
-       | rows nq+ns | interface motion nq | interface forces: now and the last two, 3 ni
+       | motion rows nq | motions nq | interface forces: now and the last two, 3 ni | site rows ns
 
 Complex numbers are split: nm real parts, then nm imaginary parts.
 """
@@ -23,16 +24,21 @@ from gearsim_sim.integrate.coefficients import Propagator
 from gearsim_sim.integrate.compiled import inlined
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 def pack_constants(propagator: Propagator) -> Array:
     """The array `k`."""
+    nq, ni, nm2 = propagator.motions, propagator.interfaces, 2 * propagator.modes
+    rows, compliance = propagator.rows.reshape(-1, nm2), propagator.compliance.reshape(-1, ni)
     parts = (
         propagator.decay,
         propagator.weights,
         propagator.left,
-        propagator.rows,
-        propagator.compliance,
+        rows[:nq],
+        compliance[:nq],
+        rows[nq:],
+        compliance[nq:],
     )
     return np.concatenate([np.ravel(part) for part in parts])
 
@@ -41,8 +47,10 @@ def pack_state(propagator: Propagator, z: Array, known: Array, forces: Array) ->
     """The array `s` for a start from rest: all forces have been as they are now."""
     nm2, ni = 2 * propagator.modes, propagator.interfaces
     modal = known + propagator.left.reshape(ni, nm2).T @ forces
-    rows = np.zeros(propagator.row_count + propagator.motions)
-    return np.concatenate([z, np.zeros(nm2), known, modal, modal, modal, rows, forces, forces, forces])
+    motions, sites = np.zeros(2 * propagator.motions), np.zeros(propagator.sites)
+    return np.concatenate(
+        [z, np.zeros(nm2), known, modal, modal, modal, motions, forces, forces, forces, sites]
+    )
 
 
 @inlined
@@ -71,11 +79,13 @@ def times_state(s: Array, k: Array, rows: int, count: int, length: int, n2: int,
     """`count` rows of k (n2 long, from `rows` on) times the predicted mode coordinates, into s[out:].
 
     `length` is n2 once more, but must not be a compile-time constant: the compiler would unroll short
-    rows into scalar code instead of filling vector registers. The mask tells it that the number is not
+    rows into scalar code instead of filling vector registers. The masks tell it that a number is not
     negative. Four rows at a time hide the latency of the sums.
     """
     n = length & 0xFFFF
-    for i in range(0, count - 3, 4):
+    blocks = (count & 0xFFFF) // 4
+    for b in range(blocks):
+        i = 4 * b
         t0 = 0.0
         t1 = 0.0
         t2 = 0.0
@@ -90,7 +100,7 @@ def times_state(s: Array, k: Array, rows: int, count: int, length: int, n2: int,
         s[out + i + 1] = t1
         s[out + i + 2] = t2
         s[out + i + 3] = t3
-    for i in range(count // 4 * 4, count):
+    for i in range(4 * blocks, count):
         total = 0.0
         for m in range(n):
             total += k[rows + i * n2 + m] * s[n2 + m]
@@ -98,20 +108,20 @@ def times_state(s: Array, k: Array, rows: int, count: int, length: int, n2: int,
 
 
 @inlined
-def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int, ns: int) -> int:
-    """Output rows of the prediction, and the motion of the interfaces with extrapolated forces.
+def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int) -> int:
+    """The motion of the interfaces at the next instant, with extrapolated forces.
 
     Returns where in `s` the motion starts: `nq` displacements (and rates, if the rows have them). The
     new forces enter through the compliance of one step only, so their extrapolation by a parabola is
-    plenty: it is wrong by far less than the scheme.
+    plenty: it is wrong by far less than the scheme. `length` is 2 nm, see `times_state`.
     """
     n2 = 2 * nm
     rows = 5 * n2 + ni * n2
-    comp = rows + (nq + ns) * n2
+    comp = rows + nq * n2
     y = 6 * n2
-    q = y + nq + ns
+    q = y + nq
     g = q + nq
-    times_state(s, k, rows, nq + ns, length, n2, y)
+    times_state(s, k, rows, nq, length, n2, y)
     for i in range(nq):
         total = s[y + i]
         for j in range(ni):
@@ -122,11 +132,11 @@ def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int,
 
 
 @inlined
-def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: int, ns: int) -> None:
+def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: int) -> None:
     """Take the new interface forces, forces[at : at + ni], into the mode coordinates and the history."""
     n2 = 2 * nm
     left = 5 * n2
-    g = 6 * n2 + 2 * nq + ns
+    g = 6 * n2 + 2 * nq
     for m in range(nm):
         s[5 * n2 + m] = s[4 * n2 + m]
         s[5 * n2 + nm + m] = s[4 * n2 + nm + m]
@@ -148,15 +158,27 @@ def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: in
 
 
 @inlined
-def site_acceleration(s: Array, k: Array, site: int, nm: int, ni: int, nq: int, ns: int) -> float:
-    """Acceleration of a site from the equation of motion, without what the known inputs give."""
+def site_accelerations(
+    s: Array, k: Array, length: int, known: Array, index: Indices, out: Array, column: int,
+    nm: int, ni: int, nq: int,
+) -> None:  # fmt: skip
+    """Accelerations of the sites from the equation of motion, added to out[index, column].
+
+    They follow from the predicted mode coordinates, the new interface forces and `known`, what the
+    known inputs give.
+    """
     n2 = 2 * nm
-    comp = 5 * n2 + ni * n2 + (nq + ns) * n2 + (nq + site) * ni
-    g = 6 * n2 + 2 * nq + ns
-    total: float = s[6 * n2 + nq + site]
-    for j in range(ni):
-        total += k[comp + j] * s[g + j]
-    return total
+    ns = known.size & 0xFFFF
+    rows = 5 * n2 + ni * n2 + nq * n2 + nq * ni
+    comp = rows + ns * n2
+    g = 6 * n2 + 2 * nq
+    y = g + 3 * ni
+    times_state(s, k, rows, ns, length, n2, y)
+    for i in range(ns):
+        total = s[y + i] + known[i]
+        for j in range(ni):
+            total += k[comp + i * ni + j] * s[g + j]
+        out[index[i], column] += total
 
 
 @inlined

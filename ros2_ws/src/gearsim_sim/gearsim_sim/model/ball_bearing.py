@@ -96,18 +96,23 @@ class BallBearing:
         return float(0.4 * self.load_factor * np.sum(np.maximum(gaps, 0.0) ** 2.5))
 
     def load_zone_half_angle_rad(self, load_n: float) -> float:
-        """Half of the angle over which balls carry, for a steady load; from the mean over azimuths."""
+        """Half of the angle over which balls carry a steady load > 0; from the mean over azimuths.
+
+        With the gap g = c (cos(angle) / cos(half) - 1) under the zone's edge at zero, the load grows with
+        the half angle; it is found by bisection.
+        """
         if self.clearance_m == 0:
             return math.pi / 2
-        zone = np.linspace(0, math.pi / 2, 2001)[1:]
-        peak = self.clearance_m * (1 / np.cos(np.minimum(zone, 1.5707)) - 1)
-        carried = np.array([self._mean_load(half, top) for half, top in zip(zone, peak, strict=True)])
-        return float(np.interp(load_n, carried, zone))
+        low, high = 0.0, math.pi / 2
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._mean_load(middle) < load_n else (low, middle)
+        return 0.5 * (low + high)
 
-    def _mean_load(self, half_angle_rad: float, peak_m: float) -> float:
-        """Load carried by a zone with this greatest compression, balls spread evenly."""
+    def _mean_load(self, half_angle_rad: float) -> float:
+        """Load carried by a zone of this half angle, balls spread evenly."""
         angle = np.linspace(-half_angle_rad, half_angle_rad, 201)
-        gap = (peak_m + self.clearance_m) * np.cos(angle) - self.clearance_m
+        gap = self.clearance_m * (np.cos(angle) / math.cos(half_angle_rad) - 1)
         density = self.load_factor * np.maximum(gap, 0.0) ** 1.5 * np.cos(angle)
         return float(np.trapezoid(density, angle)) * self.ball_count / (2 * math.pi)
 

@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
 from gearsim_sim.model.assembly import Assembly, LinearSystem
@@ -154,11 +155,23 @@ def make_gearbox(params: ParallelParams, seed: int) -> Gearbox:
         )
         for i, plate in enumerate(params.bearings)
     )
+    _check_load_zones(params, bearings)
     system = _assemble(model)
     rigid = system.direction(
         dict.fromkeys(_ROTATIONS[INPUT], 1.0) | dict.fromkeys(_ROTATIONS[OUTPUT], params.speed_ratio)
     )
     return Gearbox(params=params, system=system, mesh=mesh, bearings=bearings, rigid=rigid)
+
+
+def _check_load_zones(params: ParallelParams, bearings: tuple[BallBearing, ...]) -> None:
+    """Under the nominal load each bearing must rest on more than a single ball at a time."""
+    drive, clearance = params.model.drive, params.model.ball_bearing.radial_clearance_m
+    load_n = drive.load_nm / params.model.gear.base_radius_m / 2
+    for bearing in bearings:
+        zone = 2 * bearing.load_zone_half_angle_rad(load_n)
+        if load_n > 0 and zone < bearing.ball_spacing_rad / bearing.rows:
+            expected = f"a clearance that leaves a load zone under {load_n:.3g} N (this: {zone:.2g} rad)"
+            raise InputError(params.where, "ball_bearing.radial_clearance", clearance, expected)
 
 
 _ROTATIONS = (

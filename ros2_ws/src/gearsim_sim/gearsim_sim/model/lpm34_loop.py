@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_sim.integrate.compiled import compiled, inlined
-from gearsim_sim.integrate.kernel import correct, interface_motion, predict, site_acceleration, state_row
+from gearsim_sim.integrate.kernel import correct, interface_motion, predict, site_accelerations, state_row
 from gearsim_sim.integrate.pieces import cosine_sine, fading_slope, ramp, table_value
 
 Array = NDArray[np.float64]
@@ -194,17 +194,8 @@ def place_spalls(
         missing[bearing, ball] += depth
 
 
-@inlined
-def site_outputs(
-    s: Array, part: Part, known: Array, accel: Array, column: int, nm: int, ni: int, ns: int
-) -> None:
-    """Add a part's accelerations to the output rows."""
-    for i in range(ns):
-        accel[part.site_index[i], column] += known[i] + site_acceleration(s, part.k, i, nm, ni, ni, ns)
-
-
-def make_loop(x_modes: int, x_sites: int, y_modes: int, y_sites: int, balls: int) -> Callable[..., int]:
-    """The compiled loop for these numbers of modes and sites of the parts, and of balls (padded)."""
+def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
+    """The compiled loop for these numbers of modes of the parts and of balls (padded)."""
     nx, ny = X_INTERFACES, Y_INTERFACES
 
     def run(
@@ -218,8 +209,8 @@ def make_loop(x_modes: int, x_sites: int, y_modes: int, y_sites: int, balls: int
         at the output samples.
         """
         forces = np.zeros(INTERFACES)
-        x_known = np.zeros(x_sites)
-        y_known = np.zeros(y_sites)
+        x_known = np.zeros(data.x.site_index.size)
+        y_known = np.zeros(data.y.site_index.size)
         phases = np.zeros(2 + BEARINGS)
         touched = np.zeros((drive.spalls.shape[0], 2), dtype=np.int64)
         motor, load = known_inputs(first, drive, data)
@@ -241,8 +232,8 @@ def make_loop(x_modes: int, x_sites: int, y_modes: int, y_sites: int, balls: int
                 phases[j] = turns - math.floor(turns)
             predict(sx, data.x.k, x_modes)
             predict(sy, data.y.k, y_modes)
-            qx = interface_motion(sx, data.x.k, data.x.length, x_modes, nx, nx, x_sites)
-            qy = interface_motion(sy, data.y.k, data.y.length, y_modes, ny, ny, y_sites)
+            qx = interface_motion(sx, data.x.k, data.x.length, x_modes, nx, nx)
+            qy = interface_motion(sy, data.y.k, data.y.length, y_modes, ny, ny)
             place_spalls(step, phases, drive, data, missing, touched)
             for b in range(BEARINGS):
                 x, y = sx[qx + b], sy[qy + b]
@@ -252,12 +243,16 @@ def make_loop(x_modes: int, x_sites: int, y_modes: int, y_sites: int, balls: int
             for j in range(touched.shape[0]):
                 missing[touched[j, 0], touched[j, 1]] = 0.0
             forces[INTERFACES - 1] = -mesh_deviation(sy[qy + 4], phases[0], phases[1], speed, data)
-            correct(sx, data.x.k, forces, 0, x_modes, nx, nx, x_sites)
-            correct(sy, data.y.k, forces, nx, y_modes, ny, ny, y_sites)
+            correct(sx, data.x.k, forces, 0, x_modes, nx, nx)
+            correct(sy, data.y.k, forces, nx, y_modes, ny, ny)
             for j in range(accel.shape[0]):
                 accel[j, column + i] = 0.0
-            site_outputs(sx, data.x, x_known, accel, column + i, x_modes, nx, x_sites)
-            site_outputs(sy, data.y, y_known, accel, column + i, y_modes, ny, y_sites)
+            site_accelerations(
+                sx, data.x.k, data.x.length, x_known, data.x.site_index, accel, column + i, x_modes, nx, nx
+            )
+            site_accelerations(
+                sy, data.y.k, data.y.length, y_known, data.y.site_index, accel, column + i, y_modes, ny, ny
+            )
             if step % data.oversampling == 0:
                 motion[samples, 0] = passed
                 motion[samples, 1] = speed

@@ -14,7 +14,7 @@ _POINTS_PER_PERIOD = 48
 
 @dataclass(frozen=True, eq=False)
 class PeriodicSeries:
-    """mean + sum over m of cosine[m] cos(2 pi orders[m] u) + sine[m] sin(2 pi orders[m] u), u in turns."""
+    """mean + sum of cosine[m] cos(2 pi orders[m] u) + sine[m] sin(2 pi orders[m] u); u in turns, orders >= 1."""
 
     mean: float
     orders: NDArray[np.int64]
@@ -40,12 +40,13 @@ class PeriodicSeries:
         """
         highest = int(self.orders.max()) if self.orders.size else 1
         points = 1 << int(np.ceil(np.log2(highest * _POINTS_PER_PERIOD)))
-        turns = np.arange(points) / points
+        spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
+        np.add.at(spectrum, self.orders, (self.cosine - 1j * self.sine) / 2)
+        spectrum[0] = self.mean
+        derivative = spectrum * 2j * np.pi * np.arange(spectrum.size) / points
         result = np.empty((points + 1, 2))
-        blocks = np.array_split(np.arange(points), max(1, points * max(1, self.orders.size) // 2_000_000))
-        for block in blocks:  # in pieces: the matrix of phases of a long series is large
-            result[block, 0] = self.value(turns[block])
-            result[block, 1] = self.slope(turns[block]) / points
+        result[:-1, 0] = np.fft.irfft(spectrum, points) * points
+        result[:-1, 1] = np.fft.irfft(derivative, points) * points
         result[-1] = result[0]
         return result.ravel()
 

@@ -9,7 +9,8 @@ from gearsim_sim.integrate.modes import ComplexModes
 from gearsim_sim.model.lpm34 import Gearbox, Moment
 
 _ITERATIONS = 200
-_TOLERANCE = 1e-10
+# Newton's method ends when its next step would lower the energy by less than this fraction: rounding.
+_TOLERANCE = 1e-20
 # A spring added to each bearing in the Newton matrix only, so that a ring without contact is held [N/m].
 _GUARD = 1e4
 
@@ -22,18 +23,17 @@ def static_equilibrium(
     The energy of springs and contacts is convex, so Newton's method with a line search finds its minimum
     from any start.
     """
-    system, inverse_mass = gearbox.system, modes.compliance
-    basis = modes.shapes.shape[0]
-    projector = np.eye(basis) - modes.rigid_modes @ modes.rigid_modes.T @ system.mass
+    system, size = gearbox.system, len(gearbox.system.dof_names)
+    rigid = system.mass @ modes.rigid_modes
+    projector = np.eye(size) - modes.rigid_modes @ rigid.T
     external = projector.T @ (system.inputs @ u)
-    x = np.zeros(basis)
-    scale = float(np.sqrt(external @ inverse_mass @ external)) or 1.0
+    x = np.zeros(size)
     for _ in range(_ITERATIONS):
         gradient, tangent = _gradient_and_tangent(gearbox, moment, x, external)
-        if np.sqrt(gradient @ inverse_mass @ gradient) < _TOLERANCE * scale:
+        step = np.linalg.solve(tangent + rigid @ rigid.T * np.trace(tangent) / size, -gradient)
+        energy = potential_energy(gearbox, moment, x)
+        if -gradient @ step <= _TOLERANCE * (abs(external @ x) + energy):
             break
-        rigid = system.mass @ modes.rigid_modes
-        step = np.linalg.solve(tangent + rigid @ rigid.T * np.trace(tangent) / basis, -gradient)
         x = x + _line_search(gearbox, moment, x, step, external, float(gradient @ step)) * step
     return np.asarray(projector @ x)
 
