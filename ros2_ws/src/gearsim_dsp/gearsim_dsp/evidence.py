@@ -15,7 +15,7 @@ from gearsim_dsp.bands import Band
 from gearsim_dsp.noise_floor import effective_averages
 from gearsim_dsp.speed import ShaftSpeed, nameplate_speed
 from gearsim_dsp.speed_estimate import estimate_speed
-from gearsim_dsp.window import WindowResult
+from gearsim_dsp.window import BandSpectrum, WindowResult
 
 __all__ = ["ChannelSpectra", "EvidencePool"]
 
@@ -60,60 +60,75 @@ class ChannelSpectra:
 
 
 class _Channel:
-    """Running sums of one channel; the layout (bands, axis) is the same for all windows in it."""
+    """Running sums of one channel; the bank and the axis are the same for all windows in it.
+
+    Further bands (given, or the kurtogram's) may come and go; those that not all windows have are left out.
+    """
 
     def __init__(self, memory_windows: int | None) -> None:
-        self.memory_windows = memory_windows
         self.layout: tuple[object, ...] = ()
+        self.memory_windows = memory_windows
         self.recent: deque[WindowResult] = deque(maxlen=memory_windows)
-        self.clear()
-
-    def clear(self) -> None:
-        self.recent.clear()
-        self.power: NDArray[np.float64] | None = None
-        self.low: NDArray[np.float64] | None = None
-        self.level = np.zeros(0)
-        self.kurtosis = np.zeros(0)
-        self.marks: list[tuple[int, float, float]] = []
         self.last: WindowResult | None = None
+        self._clear_sums()
+
+    def _clear_sums(self) -> None:
+        self.low: NDArray[np.float64] | None = None
+        self.sums: dict[Band, _Sum] = {}
+        self.marks: list[tuple[int, float, float]] = []
 
     def add(self, result: WindowResult) -> None:
-        lines = result.low.power.size if result.low else 0
-        bands = tuple(s.band for s in result.spectra)
-        step = result.spectra[0].order_step if result.spectra else 0.0
-        size = result.spectra[0].power.size if result.spectra else 0
-        layout = (result.sample_rate_hz, result.sample_count, bands, step, size, lines)
+        layout = _layout(result)
         if layout != self.layout:
-            self.clear()
+            self.recent.clear()
+            self._clear_sums()
             self.layout = layout
         if self.memory_windows is None:
             self._accumulate(result)
         else:
             self.recent.append(result)
-            kept = list(self.recent)
-            self.clear_sums()
-            for item in kept:
+            self._clear_sums()
+            for item in self.recent:
                 self._accumulate(item)
         self.last = result
 
-    def clear_sums(self) -> None:
-        self.power, self.low, self.marks = None, None, []
-
     def _accumulate(self, result: WindowResult) -> None:
         assert result.low is not None
-        stack = [s.power for s in result.spectra]
-        power = np.stack(stack).astype(np.float64) if stack else np.zeros((0, 0))
-        level = np.array([s.level for s in result.spectra])
-        kurtosis = np.array([s.kurtosis for s in result.spectra])
         low = result.low.power.astype(np.float64)
-        if self.power is None or self.low is None:
-            self.power, self.level, self.kurtosis, self.low = power, level, kurtosis, low
-        else:
-            self.power += power
-            self.level += level
-            self.kurtosis += kurtosis
-            self.low += low
+        self.low = low if self.low is None else self.low + low
+        for spectrum in result.spectra:
+            self.sums.setdefault(spectrum.band, _Sum()).add(spectrum)
         self.marks.append((result.first_sample, result.turns, result.axis_speed_hz))
+
+    def complete(self) -> list[tuple[Band, _Sum]]:
+        """The bands that all windows have, in the order of the latest."""
+        bands = [s.band for s in self.last.spectra] if self.last else []
+        return [(band, self.sums[band]) for band in bands if self.sums[band].count == len(self.marks)]
+
+
+class _Sum:
+    """Sums of one band over windows."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.power: NDArray[np.float64] = np.zeros(0)
+        self.level = 0.0
+        self.kurtosis = 0.0
+
+    def add(self, spectrum: BandSpectrum) -> None:
+        power = spectrum.power.astype(np.float64)
+        self.power = power if self.count == 0 else self.power + power
+        self.level += spectrum.level
+        self.kurtosis += spectrum.kurtosis
+        self.count += 1
+
+
+def _layout(result: WindowResult) -> tuple[object, ...]:
+    bank = tuple(s.band for s in result.spectra if s.band.why == "bank")
+    step = result.spectra[0].order_step if result.spectra else 0.0
+    lines = result.spectra[0].power.size if result.spectra else 0
+    low = result.low.power.size if result.low else 0
+    return result.sample_rate_hz, result.sample_count, bank, step, lines, low
 
 
 class EvidencePool:
@@ -147,29 +162,10 @@ class EvidencePool:
         """The averages of all channels that have envelope spectra."""
         found = []
         for name, channel in self._channels.items():
-            if channel.power is None or channel.power.size == 0 or channel.last is None:
-                continue
-            found.append(self._averaged(name, channel, channel.last))
+            bands = channel.complete()
+            if bands and channel.last is not None:
+                found.append(_averaged(name, channel, channel.last, bands))
         return tuple(found)
-
-    def _averaged(self, name: str, channel: _Channel, last: WindowResult) -> ChannelSpectra:
-        assert channel.power is not None
-        count = len(channel.marks)
-        starts = np.array([m[0] for m in channel.marks], dtype=np.int64)
-        return ChannelSpectra(
-            name,
-            tuple(s.band for s in last.spectra),
-            channel.power / count,
-            channel.level / count,
-            channel.kurtosis / count,
-            last.spectra[0].order_step,
-            float(np.mean([m[1] for m in channel.marks])),
-            _averages(starts, last.sample_count),
-            count,
-            float(np.mean([m[2] for m in channel.marks])),
-            int(starts.min()),
-            int(starts.max()) + last.sample_count,
-        )
 
     def speed(self) -> ShaftSpeed:
         """Speed of the reference shaft over the windows held.
@@ -192,6 +188,27 @@ class EvidencePool:
         starts = np.array([m[0] for m in held[0].marks], dtype=np.int64)
         averages = _averages(starts, last.sample_count)
         return estimate_speed(power, last.low.step_hz, averages, self.machine)
+
+
+def _averaged(
+    name: str, channel: _Channel, last: WindowResult, bands: list[tuple[Band, _Sum]]
+) -> ChannelSpectra:
+    count = len(channel.marks)
+    starts = np.array([m[0] for m in channel.marks], dtype=np.int64)
+    return ChannelSpectra(
+        channel=name,
+        bands=tuple(band for band, _ in bands),
+        power=np.stack([total.power for _, total in bands]) / count,
+        level=np.array([total.level for _, total in bands]) / count,
+        kurtosis=np.array([total.kurtosis for _, total in bands]) / count,
+        order_step=last.spectra[0].order_step,
+        turns=float(np.mean([m[1] for m in channel.marks])),
+        averages=_averages(starts, last.sample_count),
+        windows=count,
+        axis_speed_hz=float(np.mean([m[2] for m in channel.marks])),
+        first_sample=int(starts.min()),
+        end_sample=int(starts.max()) + last.sample_count,
+    )
 
 
 def _averages(starts: NDArray[np.int64], length: int) -> float:

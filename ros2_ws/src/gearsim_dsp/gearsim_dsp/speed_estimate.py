@@ -107,19 +107,19 @@ def _line_evidence(
     chance = np.log(len(power))
     evidence = np.clip(tail(best) - chance, 0.0, _LINE_CAP)
     height = 10 * np.log10(np.maximum(best / (1.0 + chance / averages), 1e-3))
-    return evidence, np.clip(height, 0.0, _TOP_DB)
+    return evidence, np.maximum(height, 0.0)
 
 
 def _peaks(
     prominence: NDArray[np.float64], evidence: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (in lines, by a parabola), heights in dB and -ln p of the local maxima."""
+    """Positions (in lines, by a parabola), heights in dB (capped) and -ln p of the local maxima."""
     left, mid, right = prominence[:-2], prominence[1:-1], prominence[2:]
     at = np.flatnonzero((mid > left) & (mid >= right) & (mid > 3.0))
     curve = 2 * mid[at] - left[at] - right[at]
     shift = 0.5 * (right[at] - left[at]) / np.maximum(curve, 1e-12)
     position = np.asarray(at + 1 + np.clip(shift, -0.5, 0.5), dtype=np.float64)
-    return position, mid[at], evidence[at + 1]
+    return position, np.minimum(mid[at], _TOP_DB), evidence[at + 1]
 
 
 def _match(
