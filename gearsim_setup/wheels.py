@@ -106,7 +106,8 @@ def damaged(site: Path, wanted: dict[str, str]) -> list[str]:
     """Pinned distributions that pip believes installed but that are not whole.
 
     pip writes a distribution's RECORD last: one without it was cut off in the middle. With it, every
-    file it lists must be there in full; CMake files may differ in size, they are mended.
+    file it lists must be there and not cut short. Longer ones are no damage (some sites add their own
+    certificates to certifi's), and CMake files are mended.
     """
     bad = []
     for info in sorted(site.glob("*.dist-info")):
@@ -127,7 +128,7 @@ def _whole(info: Path) -> bool:
             found = os.stat(info.parent / name).st_size
         except OSError:
             return False
-        if size and int(size) != found and not name.endswith(".cmake"):
+        if size and found < int(size) and not name.endswith(".cmake"):
             return False
     return bool(rows)
 

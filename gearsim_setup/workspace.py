@@ -61,12 +61,18 @@ def build(job: Job, python: Interpreter) -> None:
 
 
 def colcon_command(job: Job, python: Interpreter) -> list[str]:
-    """The colcon call: the distribution's own where there is one, else that of the wheels."""
+    """The colcon call.
+
+    It is always the virtual environment's colcon, so that the programs it installs start with the
+    virtual environment's Python, which has the libraries; the messages are compiled for the Python
+    that ROS is for.
+    """
     places = job.places
-    system = None if job.on_wheels else shutil.which("colcon")
     interpreter = places.python if job.on_wheels else python.executable
     return [
-        *([system] if system else [str(places.python), "-m", "colcon"]),
+        str(places.python),
+        "-m",
+        "colcon",
         f"--log-base={places.workspace / 'log'}",
         "build",
         f"--base-paths={places.source}",
