@@ -21,6 +21,7 @@ from gearsim_io.importers.settings import (
     ValueSettings,
     load_settings,
 )
+from gearsim_io.importers.times import rate_of_times
 from gearsim_io.importers.units import to_hz, to_si
 from gearsim_io.machines import load_machine
 from gearsim_io.nameplate import Machine
@@ -28,7 +29,6 @@ from gearsim_io.record import Record
 
 # Rates given in several places are one and the same if they differ by less (rounding to whole Hz).
 _RATE_TOLERANCE = 1e-4
-_TIME_TOLERANCE = 0.01
 _CLIPPED_RUN = 3
 _TIME_NAMES = re.compile(r"(time|t)\s*([\[(_ ]*s(ec)?[\])]*)?", re.IGNORECASE)
 
@@ -159,16 +159,20 @@ def _rate(
     """The sampling rate; every place that states it must agree."""
     where = str(path)
     stated: dict[str, float] = {}
+    told = wanted.rate_hz is not None  # then the file need not state it where the machine's files do
     for pattern in settings.rate.variables:
-        stated[pattern] = _number(where, content, pattern)
+        if not told or content.value(pattern) is not None:
+            stated[pattern] = _number(where, content, pattern)
     for pattern in settings.rate.intervals:
-        stated[pattern] = 1.0 / _number(where, content, pattern)
-    if settings.rate.file_name is not None:
-        stated["the file's name"] = _from_name(path, settings.rate.file_name, "sampling rate")
+        if not told or content.value(pattern) is not None:
+            stated[pattern] = 1.0 / _number(where, content, pattern)
+    named = settings.rate.file_name
+    if named is not None and not (told and re.search(named, stem_of(path)) is None):
+        stated["the file's name"] = _from_name(path, named, "sampling rate")
     stated.update(content.rates_hz)
     time = settings.rate.time or _time_name(content)
     if time is not None and time in content.arrays:
-        stated[time] = _rate_of_times(where, time, content.arrays[time])
+        stated[time] = rate_of_times(where, time, content.arrays[time])
     if wanted.rate_hz is not None:
         stated = {"the rate given": wanted.rate_hz, **stated}
     elif settings.rate.value is not None:
@@ -183,25 +187,6 @@ def _rate(
         raise InputError(where, first, rate_hz, "a rate above 0 Hz")
     notes["sampling rate from"] = ", ".join(stated)
     return rate_hz
-
-
-def _rate_of_times(where: str, name: str, times_s: NDArray[Any]) -> float:
-    steps = np.diff(np.asarray(times_s, dtype=np.float64))
-    if steps.size == 0 or not np.all(np.isfinite(steps)):
-        raise InputError(where, name, "no run of finite times", "at least two times in s")
-    step_s = float((times_s[-1] - times_s[0]) / steps.size)
-    worst = int(np.argmax(np.abs(steps - step_s)))
-    # A column printed with few digits jitters by its last digit; that is not an uneven clock.
-    allowed = max(_TIME_TOLERANCE * abs(step_s), 2.0 * _resolution(steps))
-    if step_s <= 0 or abs(steps[worst] - step_s) > allowed:
-        got = f"a step of {steps[worst]:.6g} s behind sample {worst}"
-        raise InputError(where, name, got, f"even steps of {step_s:.6g} s")
-    return 1.0 / step_s
-
-
-def _resolution(steps: NDArray[np.float64]) -> float:
-    distinct = np.unique(np.round(steps, 12))
-    return float(np.min(np.diff(distinct))) if 1 < distinct.size < 4 else 0.0
 
 
 def _number(where: str, content: Content, pattern: str) -> float:

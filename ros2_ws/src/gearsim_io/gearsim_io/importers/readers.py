@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import re
 import warnings
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_io.importers.content import Content, reads
+from gearsim_io.importers.times import rate_of_times
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _DELIMITERS = (";", "\t", ",")
@@ -118,15 +120,18 @@ def read_uff(path: Path) -> Content:
         if kind != 58:
             continue
         data_set = file.read_sets(number)
-        if data_set.get("abscissa_spec_data_type") not in (17, 0, None):
+        data = np.asarray(data_set["data"])
+        if data_set.get("abscissa_spec_data_type") not in (17, 0, None) or np.iscomplexobj(data):
             continue  # not over time
         given = str(data_set.get("id1", "")).strip()
         name = given if given and given.upper() != "NONE" and given not in content.arrays else ""
         name = name or f"set{number + 1}"
-        content.arrays[name] = np.asarray(data_set["data"])
+        content.arrays[name] = data
         step_s = float(data_set.get("abscissa_inc", 0.0))
         if step_s > 0:
             content.rates_hz[f"{name}: abscissa increment"] = 1.0 / step_s
+        elif "x" in data_set:
+            content.rates_hz[f"{name}: abscissa"] = rate_of_times(str(path), name, data_set["x"])
         unit = str(data_set.get("ordinate_axis_units_lab", "")).strip()
         if unit and unit.upper() != "NONE":
             content.units[name] = unit
@@ -142,8 +147,11 @@ def read_text(path: Path) -> Content:
     lines = [line for line in text.splitlines()[:20] if line.strip() and not line.startswith("#")]
     if not lines:
         raise InputError(str(path), "", "no lines", "columns of numbers")
-    delimiter = next((mark for mark in _DELIMITERS if mark in lines[-1]), None)
-    decimal_comma = delimiter in (";", "\t") and "," in lines[-1] and "." not in lines[-1]
+    delimiter = next(
+        (mark for mark in _DELIMITERS if 2 * sum(mark in line for line in lines) >= len(lines)), None
+    )
+    rows = "".join(lines[1:])
+    decimal_comma = delimiter in (";", "\t") and "," in rows and "." not in rows
     first = _cells(lines[0], delimiter)
     has_names = not all(_is_number(cell, decimal_comma) for cell in first)
     table = _table(path, text, delimiter, decimal_comma, skip=1 if has_names else 0)
@@ -179,14 +187,15 @@ def _is_number(cell: str, decimal_comma: bool) -> bool:
 def _table(
     path: Path, text: str, delimiter: str | None, decimal_comma: bool, skip: int
 ) -> NDArray[np.float64]:
-    import io
-
     if decimal_comma:
         text = text.replace(",", ".")
-    try:
-        return np.loadtxt(io.StringIO(text), delimiter=delimiter, skiprows=skip, ndmin=2)
-    except ValueError:
-        return _slow_table(path, text, delimiter, skip)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # on a table without rows; told below
+        try:
+            table = np.loadtxt(io.StringIO(text), delimiter=delimiter, skiprows=skip, ndmin=2)
+        except ValueError:
+            table = np.empty((0, 0))
+    return table if table.size else _slow_table(path, text, delimiter, skip)
 
 
 def _slow_table(path: Path, text: str, delimiter: str | None, skip: int) -> NDArray[np.float64]:

@@ -65,7 +65,9 @@ def import_to_bag(
     for path, place in zip(paths, places, strict=True):
         if place.exists() or places.count(place) > 1:
             got = (
-                "it exists already" if place.exists() else f"wanted by several files, {path.name} among them"
+                "a folder that exists already"
+                if place.exists()
+                else f"wanted by several files, {path.name} among them"
             )
             raise InputError(str(place), "", got, "the name of a new bag")
     for path, place, record in zip(paths, places, records, strict=True):
