@@ -226,7 +226,7 @@ def test_a_node_that_cannot_keep_up_says_so_and_stays_within_its_memory(rig):
     rig.play(faulty().batches(512), times_real=25.0)
     rig.until(lambda: int(rig.status("envelope: stream")[2].get("batches dropped for lack of time", 0)) > 0)
     rig.until(lambda: int(rig.status("envelope: stream")[2].get("gaps", 0)) > 0)
-    assert any("cannot keep up" in line for line in node.lines)
+    rig.until(lambda: any("cannot keep up" in line for line in node.lines))
     assert float(rig.status("envelope: stream")[2]["signal waiting [s]"]) <= 0.6
     clean_end(node, signal.SIGTERM)
 
@@ -250,7 +250,15 @@ def test_bad_parameters_end_the_node_with_one_line_and_status_2(ros_domain, para
     assert len([line for line in node.lines if line.strip()]) == 1
 
 
-def test_ctrl_c_before_anything_arrived_is_clean(ros_domain):
-    node = ros_domain.start_node(KURTOSIS)
-    time.sleep(1.5)
+def test_ctrl_c_before_anything_arrived_is_clean(rig):
+    node = rig.domain.start_node(KURTOSIS)
+    rig.connected()
     clean_end(node)
+
+
+@pytest.mark.parametrize("after_s", [0.4, 0.8])
+def test_ctrl_c_while_it_is_still_starting_leaves_no_traceback(ros_domain, after_s):
+    node = ros_domain.start_node(ENVELOPE)
+    time.sleep(after_s)
+    assert node.stop() in (0, -signal.SIGINT)
+    assert "Traceback" not in node.output

@@ -1,55 +1,23 @@
-"""The envelope node: squared envelope spectra of every channel, bearing faults, alarms."""
+"""Entry point of the envelope node (`gearsim_dsp.nodes.envelope_node`)."""
 
-from __future__ import annotations
-
+import signal
 import sys
-from dataclasses import dataclass
-
-from gearsim_io.nameplate import Machine
-from gearsim_io.nodes.parameters import parameter
-from gearsim_io.nodes.run import run_node
-
-from gearsim_dsp.nodes.base import MonitorNode
-from gearsim_dsp.nodes.parameters import MonitorParameters
-from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
-from gearsim_dsp.streams.report import AlarmedMonitor
-
-SOURCE = "envelope"
-_DEFAULT = EnvelopeSettings()
-
-
-@dataclass(frozen=True)
-class EnvelopeParameters(MonitorParameters):
-    """Parameters of the envelope node."""
-
-    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
-    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
-    memory_windows: int = parameter(0, "windows averaged for a judgement; 0: automatic", 0, 1000)
-    kurtogram_every: int = parameter(
-        _DEFAULT.kurtogram_every, "windows from one choice of a band to the next; 0: none", 0, 1000
-    )
-
-    def check(self) -> None:
-        """Raise InputError where values contradict each other."""
-        super().check()
-        self.envelope_settings()
-
-    def envelope_settings(self) -> EnvelopeSettings:
-        """The part for the monitor."""
-        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
-        band = None if automatic else (self.band_low_hz, self.band_high_hz)
-        return EnvelopeSettings(self.window_settings(), band, self.memory_windows, self.kurtogram_every)
-
-
-def make_monitor(machine: Machine, parameters: EnvelopeParameters) -> AlarmedMonitor:
-    """The monitor of a machine with its alarms."""
-    monitor = EnvelopeMonitor(machine, parameters.envelope_settings(), SOURCE)
-    return AlarmedMonitor(monitor, parameters.alarm_settings())
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until it is told to stop."""
-    return run_node(lambda: MonitorNode(SOURCE, EnvelopeParameters, make_monitor), SOURCE, args)
+    """Run the node until it is told to stop.
+
+    Returns the exit status: 0 after Ctrl-C or SIGTERM, 2 for bad parameters (one line on stderr). Ctrl-C
+    while
+    the libraries are still being loaded ends the process at once and silently.
+    """
+    previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from gearsim_io.nodes.run import run_node
+
+    from gearsim_dsp.nodes.envelope_node import make_node
+
+    signal.signal(signal.SIGINT, previous)
+    return run_node(make_node, "envelope", args)
 
 
 if __name__ == "__main__":

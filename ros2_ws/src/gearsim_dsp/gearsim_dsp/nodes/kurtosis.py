@@ -1,51 +1,23 @@
-"""The kurtosis node: RMS, kurtosis and crest factor of every channel, whole and in bands, alarms."""
+"""Entry point of the kurtosis node (`gearsim_dsp.nodes.kurtosis_node`)."""
 
-from __future__ import annotations
-
+import signal
 import sys
-from dataclasses import dataclass
-
-from gearsim_io.nameplate import Machine
-from gearsim_io.nodes.parameters import parameter
-from gearsim_io.nodes.run import run_node
-
-from gearsim_dsp.nodes.base import MonitorNode
-from gearsim_dsp.nodes.parameters import MonitorParameters
-from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
-from gearsim_dsp.streams.report import AlarmedMonitor
-
-SOURCE = "kurtosis"
-
-
-@dataclass(frozen=True)
-class KurtosisParameters(MonitorParameters):
-    """Parameters of the kurtosis node."""
-
-    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
-    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
-    bands: int = parameter(8, "bands of equal width that the spectrum is cut into", 1, 64)
-
-    def check(self) -> None:
-        """Raise InputError where values contradict each other."""
-        super().check()
-        self.kurtosis_settings()
-
-    def kurtosis_settings(self) -> KurtosisSettings:
-        """The part for the monitor."""
-        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
-        band = None if automatic else (self.band_low_hz, self.band_high_hz)
-        return KurtosisSettings(self.window_settings(), self.bands, band)
-
-
-def make_monitor(machine: Machine, parameters: KurtosisParameters) -> AlarmedMonitor:
-    """The monitor of a machine with its alarms."""
-    monitor = KurtosisMonitor(machine, parameters.kurtosis_settings(), SOURCE)
-    return AlarmedMonitor(monitor, parameters.alarm_settings())
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until it is told to stop."""
-    return run_node(lambda: MonitorNode(SOURCE, KurtosisParameters, make_monitor), SOURCE, args)
+    """Run the node until it is told to stop.
+
+    Returns the exit status: 0 after Ctrl-C or SIGTERM, 2 for bad parameters (one line on stderr). Ctrl-C
+    while
+    the libraries are still being loaded ends the process at once and silently.
+    """
+    previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from gearsim_io.nodes.run import run_node
+
+    from gearsim_dsp.nodes.kurtosis_node import make_node
+
+    signal.signal(signal.SIGINT, previous)
+    return run_node(make_node, "kurtosis", args)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,50 @@
+"""The envelope node: squared envelope spectra of every channel, bearing faults, alarms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gearsim_io.nameplate import Machine
+from gearsim_io.nodes.parameters import parameter
+
+from gearsim_dsp.nodes.base import MonitorNode
+from gearsim_dsp.nodes.parameters import MonitorParameters
+from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
+from gearsim_dsp.streams.report import AlarmedMonitor
+
+SOURCE = "envelope"
+_DEFAULT = EnvelopeSettings()
+
+
+@dataclass(frozen=True)
+class EnvelopeParameters(MonitorParameters):
+    """Parameters of the envelope node."""
+
+    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
+    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
+    memory_windows: int = parameter(0, "windows averaged for a judgement; 0: automatic", 0, 1000)
+    kurtogram_every: int = parameter(
+        _DEFAULT.kurtogram_every, "windows from one choice of a band to the next; 0: none", 0, 1000
+    )
+
+    def check(self) -> None:
+        """Raise InputError where values contradict each other."""
+        super().check()
+        self.envelope_settings()
+
+    def envelope_settings(self) -> EnvelopeSettings:
+        """The part for the monitor."""
+        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
+        band = None if automatic else (self.band_low_hz, self.band_high_hz)
+        return EnvelopeSettings(self.window_settings(), band, self.memory_windows, self.kurtogram_every)
+
+
+def make_monitor(machine: Machine, parameters: EnvelopeParameters) -> AlarmedMonitor:
+    """The monitor of a machine with its alarms."""
+    monitor = EnvelopeMonitor(machine, parameters.envelope_settings(), SOURCE)
+    return AlarmedMonitor(monitor, parameters.alarm_settings())
+
+
+def make_node() -> MonitorNode:
+    """The node, once rclpy is ready."""
+    return MonitorNode(SOURCE, EnvelopeParameters, make_monitor)
