@@ -14,7 +14,7 @@ _POINTS_PER_PERIOD = 48
 
 @dataclass(frozen=True, eq=False)
 class PeriodicSeries:
-    """mean + sum of cosine[m] cos(2 pi orders[m] u) + sine[m] sin(2 pi orders[m] u); u in turns, orders >= 1."""
+    """mean + sum of cosine cos(2 pi orders u) + sine sin(2 pi orders u); u in turns, orders >= 1."""
 
     mean: float
     orders: NDArray[np.int64]
