@@ -123,12 +123,13 @@ def screenshot(recording: Path, out: Path, window: tuple[int, int] = WINDOW) -> 
     if out.is_file() and out.stat().st_size > 0:
         return
     said = (done.stderr + done.stdout).decode("utf-8", "replace")
-    if any(word in said for word in ("adapter", "Vulkan", "wgpu", "graphics")):
+    if any(word in said for word in ("render context", "adapter", "Vulkan", "wgpu")):
         raise EnvironmentLackError(
             "no Vulkan driver for pictures", "sudo apt-get install -y mesa-vulkan-drivers"
         )
-    last = (said.strip().splitlines() or ["no word"])[-1]
-    raise BagError(f"{out}: the viewer ended with {done.returncode}: {last}")
+    lines = [line for line in said.splitlines() if line.strip()] or ["no word"]
+    reason = next((line for line in lines if "panicked" in line or "ERROR" in line), lines[-1])
+    raise BagError(f"{out}: the viewer ended with {done.returncode}: {reason}")
 
 
 def start_viewer(home: Path, port: int) -> subprocess.Popen[bytes]:

@@ -1,0 +1,279 @@
+"""What a bag becomes in rerun: verified by rerun's own tools, and its picture looked at in numbers."""
+
+from __future__ import annotations
+
+import subprocess
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from gearsim_dsp import results
+from gearsim_io import rerun_export
+from gearsim_io.bags import BagWriter, StreamWriter
+from gearsim_io.errors import EnvironmentLackError, InputError
+from gearsim_io.health import Level
+from gearsim_io.machines import load_machine
+from gearsim_io.scene import look_through
+from gearsim_io.scene.waves import Outliner, cut
+from recordings import make_record, write_bag
+
+SECOND = 1_000_000_000
+
+
+def alarm(t_ns, level=Level.ERROR):
+    return results.Alarm(
+        t_ns=t_ns,
+        frame_id="unsw_parallel",
+        alarm_id="envelope/bearing_3/outer_race",
+        source="envelope",
+        component="bearing_3",
+        fault="outer_race",
+        channel="b3_y",
+        level=level,
+        previous_level=Level.OK,
+        expected_order=4.89,
+        found_order=4.89,
+        found_frequency_hz=48.9,
+        value=30.0,
+        threshold=12.0,
+        unit="dB",
+        confidence=0.99,
+        sample=1,
+        reason="outer race of bearing_3: 48.9 Hz",
+    )
+
+
+def window(record, k):
+    return {
+        "t0_ns": record.t0_ns + k * SECOND // 2,
+        "frame_id": "unsw_parallel",
+        "channel": "b3_y",
+        "first_sample": 2048 * k,
+        "sample_count": 4096,
+        "sample_rate_hz": 4096.0,
+        "band_low_hz": 0.0,
+        "band_high_hz": 2048.0,
+        "speed_hz": 10.0,
+    }
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """Six seconds with all that the nodes would add; the alarm comes at 4 s."""
+    record = make_record(seconds=6.0)
+    path = tmp_path_factory.mktemp("scene") / "bag"
+    rng = np.random.default_rng(3)
+    with BagWriter(path) as writer:
+        stream = StreamWriter(writer)
+        stream.write(load_machine("unsw_parallel"), record.t0_ns)
+        for batch in record.batches(512):
+            stream.write(batch)
+        for k in range(10):
+            common = window(record, k)
+            snr = 6.0 if k < 6 else 30.0
+            values = (
+                results.FeatureValue("bpfo_snr", "bearing_3", snr, "dB"),
+                results.FeatureValue("kurtosis", "", 3.0 + k, "1"),
+            )
+            t_ns = common["t0_ns"] + SECOND
+            stream.write(
+                results.Features(**common, source="envelope", speed_source="tacho", values=values), t_ns
+            )
+            power = rng.random(400).astype(np.float32)
+            power[98] = 20.0
+            spectrum = results.Spectrum(
+                **common,
+                source="envelope",
+                kind="squared_envelope",
+                axis_unit="order",
+                axis_start=0.0,
+                axis_step=0.05,
+                value_unit="1",
+                values=power,
+                markers=(results.SpectrumMarker("BPFO", "bearing_3", 4.9, 3, 0.0, snr),),
+            )
+            stream.write(spectrum, t_ns)
+        start = results.AlarmState(record.t0_ns + SECOND, "unsw_parallel", "envelope", Level.OK, False, "", 0)
+        raised = alarm(record.t0_ns + 4 * SECOND)
+        state = results.AlarmState(
+            raised.t_ns, "unsw_parallel", "envelope", Level.ERROR, False, "", 1, (raised,)
+        )
+        for obj in (start, raised, state):
+            stream.write(obj)
+    return path
+
+
+def rerun_says(*arguments):
+    viewer = rerun_export.viewer_path()
+    done = subprocess.run(
+        [str(viewer), "rrd", *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_recording_is_sound_and_complete(bag, tmp_path):
+    overview = rerun_export.export(bag, tmp_path / "out.rrd")
+    assert overview.alarms
+    rerun_says("verify", tmp_path / "out.rrd")
+    listed = rerun_says("stats", tmp_path / "out.rrd")
+    for entity in (
+        "/accel/b3_x",
+        "/accel/b3_y",
+        "/zoom/At_the_alarm",
+        "/spectrum/b3_y/BPFO",
+        "/spectrum/b3_y/other_lines",
+        "/faults/BPFO",
+        "/faults_by_part/bearing_3/BPFO",
+        "/kurtosis/b3_y",
+        "/speed/input",
+        "/state/node_envelope",
+        "/alarms",
+        "/summary",
+        "/marks/accel/alarm",
+    ):
+        assert f"{entity}:" in listed, entity
+
+
+def test_full_detail_is_larger_than_the_outline(bag, tmp_path):
+    rerun_export.export(bag, tmp_path / "thin.rrd")
+    rerun_export.export(bag, tmp_path / "full.rrd", full=True)
+    rerun_says("verify", tmp_path / "full.rrd")
+    samples = 2 * 6 * 4096
+    assert (tmp_path / "full.rrd").stat().st_size > 8 * samples
+
+
+def test_an_existing_file_is_kept_unless_told(bag, tmp_path):
+    out = tmp_path / "out.rrd"
+    out.write_text("mine")
+    with pytest.raises(InputError, match="a file that exists already"):
+        rerun_export.export(bag, out)
+    assert out.read_text() == "mine"
+    rerun_export.export(bag, out, overwrite=True)
+    rerun_says("verify", out)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "words"),
+    [
+        (rerun_export.export, "out.png", "a name that ends in .rrd"),
+        (rerun_export.png, "out.rrd", "a name that ends in .png"),
+    ],
+)
+def test_names_are_checked(bag, tmp_path, make, name, words):
+    with pytest.raises(InputError, match=words):
+        make(bag, tmp_path / name)
+
+
+def test_a_bag_without_samples_is_told(tmp_path):
+    with BagWriter(tmp_path / "bag") as writer:
+        StreamWriter(writer).write(load_machine("mfpt"), 1)
+    with pytest.raises(InputError, match="no samples"):
+        rerun_export.export(tmp_path / "bag", tmp_path / "out.rrd")
+
+
+def test_the_overview_finds_the_story(bag):
+    overview = look_through(bag)
+    assert overview.end_s == pytest.approx(6.0)
+    assert overview.worst.component == "bearing_3"
+    focus = overview.focus()
+    assert focus.channel == "b3_y"
+    assert focus.ordered[0] == "b3_y"
+    assert focus.parts == "bearing_3"
+    (zoom,) = focus.zooms
+    assert (zoom.name, zoom.end_s) == ("At the alarm", pytest.approx(4.0))
+    assert "4.00 s: **Alarm**: outer race of bearing_3" in overview.summary()
+
+
+def test_a_bag_without_diagnosis_still_shows(tmp_path):
+    path = write_bag(tmp_path / "bag", make_record())
+    overview = rerun_export.export(path, tmp_path / "out.rrd")
+    assert "No diagnosis was recorded" in overview.summary()
+    assert overview.focus().zooms[0].name == "In detail"
+    rerun_says("verify", tmp_path / "out.rrd")
+
+
+@pytest.mark.parametrize(("block", "cuts"), [(7, (100, 133, 500)), (64, (64, 128)), (1, (10,)), (50, ())])
+def test_an_outline_keeps_every_peak_for_any_cutting(block, cuts):
+    data = np.random.default_rng(1).standard_normal((3, 1000)).astype(np.float32)
+    outliner = Outliner(block)
+    places, values = [], []
+    edges = [0, *cuts, 1000]
+    for start, stop in pairwise(edges):
+        where, what = outliner.push(start, data[:, start:stop])
+        places.append(where)
+        values.append(what)
+    outline, where = np.concatenate(values, axis=1), np.concatenate(places)
+    used = 1000 // block * block
+    assert np.array_equal(outline.max(axis=1), data[:, :used].max(axis=1))
+    assert np.array_equal(outline.min(axis=1), data[:, :used].min(axis=1))
+    assert np.all(np.diff(where) > 0)
+    if block > 1:
+        blocks = data[:, :used].reshape(3, -1, block)
+        assert np.array_equal(outline[:, 0::2], blocks.min(axis=2))
+        assert np.array_equal(outline[:, 1::2], blocks.max(axis=2))
+
+
+def test_an_outline_does_not_span_a_gap():
+    outliner = Outliner(10)
+    ones = np.ones((1, 15), np.float32)
+    outliner.push(0, ones)
+    places, values = outliner.push(1000, 5 * ones)
+    assert places[0] == 1000
+    assert values.min() == 5.0
+
+
+def test_a_cut_has_exactly_the_samples_in_its_span():
+    data = np.arange(100, dtype=np.float32)[None, :]
+    times, values = cut(200, data, 10.0, 150.0, (6.0, 8.0))
+    assert np.allclose(times, np.arange(6.0, 8.01, 0.1))
+    assert np.array_equal(values[0], np.arange(10, 31))
+    assert cut(200, data, 10.0, 150.0, (50.0, 60.0))[0].size == 0
+
+
+def test_the_picture_shows_something(bag, tmp_path):
+    try:
+        rerun_export.png(bag, tmp_path / "out.png", window=(1000, 700))
+    except EnvironmentLackError as lack:
+        pytest.skip(str(lack))
+    from PIL import Image
+
+    pixels = np.asarray(Image.open(tmp_path / "out.png").convert("RGB")).astype(int)
+    assert pixels.shape[0] >= 700
+    assert pixels.shape[1] >= 1000
+
+    def count(rgb, tolerance=45):
+        return int(np.count_nonzero(np.abs(pixels - np.array(rgb)).max(axis=2) < tolerance))
+
+    whole = pixels.shape[0] * pixels.shape[1]
+    assert count((110, 170, 230)) > 0.01 * whole, "waveforms in blue"
+    assert count((215, 60, 55)) > 0.002 * whole, "the alarm in red"
+    assert count((60, 130, 80)) > 0.001 * whole, "the time before it in green"
+
+
+def test_no_driver_is_a_lack_with_its_remedy(bag, tmp_path, monkeypatch):
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/nonexistent.json")
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nonexistent.json")
+    with pytest.raises(EnvironmentLackError, match="mesa-vulkan-drivers"):
+        rerun_export.png(bag, tmp_path / "out.png", window=(600, 400))
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_the_viewer_is_bound_to_this_computer_and_sends_nothing(bag, tmp_path, monkeypatch):
+    seen = []
+    real = subprocess.run
+
+    def watch(command, **options):
+        seen.append((command, options))
+        return real(command, **options)
+
+    monkeypatch.setattr(rerun_export.subprocess, "run", watch)
+    try:
+        rerun_export.png(bag, tmp_path / "out.png", window=(600, 400))
+    except EnvironmentLackError as lack:
+        pytest.skip(str(lack))
+    (off, _), (draw, options) = seen
+    assert off[1:] == ["analytics", "disable"]
+    assert draw[draw.index("--bind") + 1] == "127.0.0.1"
+    assert options["env"]["HOME"] != "", "settings of its own"
+    assert "gearsim-rerun-" in options["env"]["HOME"]
