@@ -45,7 +45,7 @@ class Rig:
         qos.create_subscription(self.node, topic, heard.append)
         return heard
 
-    def until(self, condition, timeout_s=20.0):
+    def until(self, condition, timeout_s=60.0):
         assert self.domain.spin(self.node, condition, timeout_s), "it did not happen in time"
 
     def connected(self, nodes=1):
