@@ -48,19 +48,29 @@ def inlined(function: Function) -> Function:
 
 @cache
 def cache_folder() -> Path | None:
-    """Where compiled code is kept: below $XDG_CACHE_HOME or ~/.cache, else the temporary folder; or None."""
+    """Where compiled code is kept: below $XDG_CACHE_HOME or ~/.cache, else the temporary folder; or None.
+
+    The folder must belong to this user and not be open to all, since its content is executed.
+    """
     stamp = _source_hash()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     user = f"gearsim-{os.getuid()}" if hasattr(os, "getuid") else "gearsim"
     for base in (Path(home) / "gearsim", Path(tempfile.gettempdir()) / user):
         folder = base / f"numba-{stamp}"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                return folder
+                pass
         except OSError:
             continue
+        if _is_private(base) and _is_private(folder):
+            return folder
     return None
+
+
+def _is_private(folder: Path) -> bool:
+    status = folder.stat()
+    return not hasattr(os, "getuid") or (status.st_uid == os.getuid() and not status.st_mode & 0o002)
 
 
 def _source_hash() -> str:
