@@ -52,6 +52,7 @@ class Player(Node):
     def __init__(self) -> None:
         super().__init__("player", namespace=qos.NAMESPACE)
         self._given = declare_parameters(self, PlayerParameters)
+        self._timeline = self._declare_timeline()
         if not self._given.bag:
             raise InputError("parameter of node player", "bag", "nothing", "the folder of a bag")
         self.exit_status: int | None = None
@@ -59,7 +60,6 @@ class Player(Node):
         self._failure: BaseException | None = None
         chosen = self._choose(topics_of(self._given.bag))
         self._players = {name: self._make_publisher(topic) for name, topic in chosen.items()}
-        self._timeline = self._declare_timeline()
         self._playback = Playback(
             self._timeline,
             partial(read_bag, self._given.bag, tuple(self._players)),
