@@ -109,7 +109,7 @@ def crossings(forces):
 
 @pytest.mark.parametrize("kind", sorted(REGISTRY))
 def test_entry_to_impact_time(params, bearings, kind):
-    """About 0.6 ms for 0.8 mm at 10 Hz on either race (thesis 5.6).
+    """About 0.6 ms for 0.8 mm at 10 Hz on either race (thesis 5.8).
 
     On the contact force of the ball: from entry, where 5 % of its load is gone, to the impact, where it
     changes from the entry edge to the exit edge: the middle of the stretch in which it is loose.
