@@ -59,6 +59,21 @@ def test_the_antialias_slope_does_not_win():
     assert rolloff_hz(x, RATE) == pytest.approx(0.5 * 0.86 * RATE, rel=0.05)
 
 
+def test_a_band_with_hardly_any_energy_does_not_win():
+    """Impacts 50 dB below the rest, in a band that is otherwise empty."""
+    rng = np.random.default_rng(6)
+    x = lfilter(firwin(401, 0.5), 1.0, 100 * _defect(rng, 3000.0, 0.7))
+    turns = turns_of(25.0, 2.0, RATE)
+    faint = defect(rng, turns, RATE, 1.0, resonance_hz=8500.0, damping=0.05).x
+    x = x + 0.3 * lfilter(firwin(401, [0.6, 0.8], pass_zero=False), 1.0, faint)
+    plain = max(fast_kurtogram(x, RATE, 4).nodes[1:], key=lambda node: node.kurtosis)
+    assert plain.low_hz > 6500
+    choice = choose_band(x, RATE, LEAST_HZ)
+    assert choice.band is not None
+    assert choice.band.low_hz <= 3000 <= choice.band.high_hz
+    assert any("energy" in text for text in choice.rejected)
+
+
 def test_beating_lines_do_not_win():
     """Ten inverter lines 25 Hz apart are a pulse train to a plain kurtogram."""
     rng = np.random.default_rng(4)

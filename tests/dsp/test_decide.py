@@ -1,11 +1,17 @@
 """Decisions on synthetic signals with known answers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bearing_signals import Signal, defect, machine, noise, rotating_lines, turns_of
+from gearsim_dsp.bands import Band
 from gearsim_dsp.decide import ALARM_PROBABILITY, MODULATION_LIMIT, find_faults, is_fault
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.kinematics import fault_families
+from gearsim_dsp.speed import nameplate_speed
+from gearsim_dsp.window import WindowInput, analyse_window
+from gearsim_io.nameplate import Bearing
 from pooling import pool_of, verdict_of
 from scipy import stats
 
@@ -100,6 +106,44 @@ def test_two_faults_at_once_are_both_found():
     assert {f.fault for f in verdict.findings} == {"outer_race", "inner_race"}
 
 
+def test_a_second_fault_a_third_as_large_is_found_beside_the_first():
+    rng = np.random.default_rng(9)
+    made = _made(9, BPFO, 0.9)
+    second = defect(rng, made.turns, RATE, BPFI, carrier_order=1.0, resonance_hz=3700.0)
+    verdict = verdict_of((made.x + 0.6 * second.x)[None], RATE, machine(tacho=True), made.tacho())
+    assert [f.fault for f in verdict.findings] == ["outer_race", "inner_race"]
+
+
+def test_shaft_harmonics_next_to_fault_orders_do_not_count():
+    """The Koyo 1205's BPFO of 4.89 lies next to 5x and its BPFI of 7.11 next to 7x; 18 turns do not part
+    them.
+    """
+    bearing = Bearing("koyo", "shaft", 12, 7.12e-3, 38.5e-3, 0.0, False, ("ch_1",))
+    plate = replace(machine(9.0, tacho=True), bearings=(bearing,))
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        turns = turns_of(9.0, 6.0, RATE)
+        swing = np.exp(rotating_lines(turns, dict.fromkeys((5, 7, 10, 14, 15, 20, 21), 0.35)))
+        made = Signal(noise(rng, turns.size) * swing, RATE, turns)
+        assert verdict_of(made.x[None], RATE, plate, made.tacho()).findings == ()
+
+
+def test_bands_that_come_and_go_do_not_cost_the_windows_of_the_bank():
+    rng = np.random.default_rng(10)
+    x = noise(rng, 96_000)
+    plate = machine()
+    pool = EvidencePool(plate)
+    for number, start in enumerate(range(0, 64_001, 16_000)):
+        bands = (Band(3000.0, 4500.0, "kurtogram"),) if number < 3 else (Band(5000.0, 6500.0, "kurtogram"),)
+        part = WindowInput(
+            x[start : start + 32_000], RATE, "ch_1", start, nameplate_speed(plate), plate, bands
+        )
+        pool.add([analyse_window(part)])
+    (spectra,) = pool.spectra()
+    assert spectra.windows == 5
+    assert {band.why for band in spectra.bands} == {"bank"}
+
+
 def test_modulation_by_the_shaft_is_no_bearing_fault():
     """Noise that swings with the shaft and its harmonics, as gears make it; 13 x 3.245 falls near no shaft
     line.
@@ -142,7 +186,7 @@ def test_a_weak_family_is_noted_but_not_found():
 
 @pytest.mark.parametrize("colour", [0.0, 0.8])
 def test_false_alarm_probability_is_calibrated(colour):
-    """On noise, p < alpha in at most a share alpha of the families judged, and not far below (three sigma)."""
+    """On noise p < alpha in at most a share alpha of the families judged, and not far below."""
     plate = machine(tacho=True)
     values = []
     for seed in range(110):

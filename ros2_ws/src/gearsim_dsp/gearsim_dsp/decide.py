@@ -43,6 +43,8 @@ MODULATION_LIMIT = 0.12
 DOMINANCE_LIMIT = 1.6
 _MOST_FINDINGS = 4
 _CAGE_FUNDAMENTAL_DB = 10.0
+_SECOND_DOMINANCE = 3.0
+_SECOND_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,9 +128,10 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
     findings: list[Finding] = []
     open_groups = list(groups)
     while open_groups and len(findings) < _MOST_FINDINGS:
-        best = max(open_groups, key=lambda g: _strength(latest[id(g)]))
-        if not is_fault(_best(latest[id(best)])):
+        good = [g for g in open_groups if _stands(machine, g, latest[id(g)], findings)]
+        if not good:
             break
+        best = max(good, key=lambda g: _best(latest[id(g)]).modulation)
         findings.append(_finding(machine, best, latest[id(best)], speed))
         open_groups.remove(best)
         open_groups = [g for g in open_groups if not _accompanies(g, findings[-1])]
@@ -138,6 +141,26 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
             latest[id(group)] = _judge(group, searches)
     evidence = tuple(replace(_best(latest[id(g)]), family=family) for g in groups for family in g.families)
     return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed, by_channel)
+
+
+def _stands(machine: Machine, group: _Group, judged: list[FamilyEvidence], findings: list[Finding]) -> bool:
+    """True for a fault that is no companion of one found before.
+
+    On one bearing BPFO + BPFI = N turns: a fault of one race whose amplitude swings with the shaft has
+    sidebands next to the other's lines. A second fault of a bearing must be clearer than a first.
+    """
+    evidence = _best(judged)
+    if not is_fault(evidence):
+        return False
+    component = _component(machine, group, judged)[0].component
+    for finding in findings:
+        first = finding.evidence["modulation"]
+        assert isinstance(first, float)
+        if finding.component == component and (
+            evidence.dominance < _SECOND_DOMINANCE or evidence.modulation < _SECOND_SHARE * first
+        ):
+            return False
+    return True
 
 
 def _accompanies(group: _Group, finding: Finding) -> bool:
@@ -165,11 +188,6 @@ def _best(judged: list[FamilyEvidence]) -> FamilyEvidence:
     if sure:
         return max(sure, key=lambda e: e.modulation * min(e.dominance, DOMINANCE_LIMIT))
     return min(judged, key=lambda e: e.false_alarm_probability)
-
-
-def _strength(judged: list[FamilyEvidence]) -> float:
-    best = _best(judged)
-    return best.modulation if is_fault(best) else 0.0
 
 
 def is_fault(evidence: FamilyEvidence) -> bool:

@@ -24,7 +24,8 @@ _CLEAR = 12.0
 _REFINE_SHARE = 0.25
 _PLATEAU = 0.7
 _TOP_HARMONICS = 4
-_SIDEBANDS_EXPLAINED = 5
+_OWN_SIDEBANDS = 4
+_SHAFT_SIDEBANDS = 1
 _CELL_SHARE = 0.5  # independent looks per resolution cell of the 8th harmonic, counted on noise
 
 
@@ -266,8 +267,9 @@ class FamilySearch:
         shifts = {0.0}
         if family.order < 1.0:
             return np.asarray(np.abs(order - np.maximum(1.0, np.round(order / found)) * found) < width)
-        for spacing in {self._scale, family.sideband_order * self._scale} - {0.0}:
-            shifts |= {k * spacing for k in range(-_SIDEBANDS_EXPLAINED, _SIDEBANDS_EXPLAINED + 1)}
+        own = family.sideband_order * self._scale
+        shifts |= {k * self._scale for k in range(-_SHAFT_SIDEBANDS, _SHAFT_SIDEBANDS + 1)}
+        shifts |= {k * own for k in range(-_OWN_SIDEBANDS, _OWN_SIDEBANDS + 1)}
         lines = np.zeros(order.size, dtype=np.bool_)
         for shift in shifts:
             number = np.maximum(1.0, np.round((order - shift) / found))
