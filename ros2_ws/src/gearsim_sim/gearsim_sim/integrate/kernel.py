@@ -182,9 +182,9 @@ def site_accelerations(
 
 
 @inlined
-def state_row(s: Array, row: Array, nm: int) -> float:
-    """One linear output of the mode coordinates, such as the angle of an encoder."""
+def state_row(s: Array, row: Array, length: int) -> float:
+    """One linear output of the mode coordinates, such as the angle of an encoder; `length` is 2 nm."""
     total = 0.0
-    for m in range(2 * nm):
+    for m in range(length & 0xFFFF):
         total += row[m] * s[m]
     return total

@@ -258,10 +258,10 @@ def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
                 motion[samples, 1] = speed
                 at = 2
                 for j in range(data.x.state_rows.shape[0]):
-                    motion[samples, at + j] = state_row(sx, data.x.state_rows[j], x_modes)
+                    motion[samples, at + j] = state_row(sx, data.x.state_rows[j], data.x.length)
                 at += data.x.state_rows.shape[0]
                 for j in range(data.y.state_rows.shape[0]):
-                    motion[samples, at + j] = state_row(sy, data.y.state_rows[j], y_modes)
+                    motion[samples, at + j] = state_row(sy, data.y.state_rows[j], data.y.length)
                 at += data.y.state_rows.shape[0]
                 for j in range(INTERFACES):
                     motion[samples, at + j] = forces[j]
