@@ -111,17 +111,24 @@ def test_a_change_repeats_only_what_it_touches(tools: Tools, copy: Path, name: s
     assert tools.run() == again
 
 
-@pytest.mark.parametrize("cut_off_in", ["wheels", "build"])
+@pytest.mark.parametrize(
+    ("name", "cut_off_in"),
+    [
+        ("requirements.lock", "wheels"),
+        ("requirements.lock", "build"),
+        ("ros2_ws/src/some_msgs/msg/One.msg", "build"),
+        ("ros2_ws/src/some_program/setup.py", "build"),
+    ],
+)
 def test_a_change_that_was_cut_off_is_not_forgotten_when_it_is_undone(
-    tools: Tools, copy: Path, cut_off_in: str
+    tools: Tools, copy: Path, name: str, cut_off_in: str
 ) -> None:
     """The half-made environment must not pass for the old whole one."""
     tools.run()
-    lock = copy / "requirements.lock"
-    before = lock.read_text()
-    lock.write_text(before + "# changed\n")
+    before = (copy / name).read_text()
+    (copy / name).write_text(before + "# changed\n")
     tools.run(cut_off_in)
-    lock.write_text(before)
+    (copy / name).write_text(before)
     assert not is_ready(tools.places, WHEELS)
     assert cut_off_in in tools.run()
 
