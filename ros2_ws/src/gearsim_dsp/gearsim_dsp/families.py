@@ -20,6 +20,7 @@ __all__ = ["BandLevel", "FamilyEvidence", "FamilySearch"]
 _BLOCK_LINES = 160
 _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
+_MOST_DOMINANCE = 1000.0
 _CLEAR = 12.0
 _REFINE_SHARE = 0.25
 _PLATEAU = 0.7
@@ -254,7 +255,8 @@ class FamilySearch:
         inside = index < self._excess.shape[1]
         index = np.where(inside, index, 0)
         power = np.maximum(self._excess[band, index], 0.0) * (inside & unexplained[index])
-        return modulation / max(float(np.max(2.0 * power.sum(axis=1))), 1e-12)
+        rival = float(np.max(2.0 * power.sum(axis=1), initial=0.0))
+        return min(modulation / max(rival, 1e-12), _MOST_DOMINANCE)
 
     def explain(self, family: FaultFamily, found_order: float) -> None:
         """Take the lines of a family that was found out of the search for others."""
