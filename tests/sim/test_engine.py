@@ -309,6 +309,7 @@ def test_extremes_stay_finite(params, given, operating):
         (lambda p: Engine(p, 1, RATE_HZ, sites={"a": {"y_p9": 1.0}}), "sites.a"),
         (lambda p: Engine(p, 1, RATE_HZ, sites={}), "sites"),
         (lambda p: Engine(p, 1, RATE_HZ, probes=["b9_y.force_n"]), "probes"),
+        (lambda p: Engine(p, 1, RATE_HZ, 4, [SPALL, SPALL]), "fault_id"),
     ],
 )
 def test_bad_input_is_named(params, build, field):

@@ -61,7 +61,10 @@ class Timeline:
             self._queue.pop(0)[1](schedule, step)
 
     def initial_spall(self, spec: FaultSpec, first_step: int) -> Spall:
-        """A fault that is there from the start."""
+        """A fault that is there from the start; each needs a name of its own."""
+        if any(change.name == spec.name for change in self._log):
+            expected = "a fault_id of its own, since another fault has that name"
+            raise InputError(f"fault {spec.name}", "fault_id", spec.name, expected)
         spall = self._build(spec)
         self._note(_FaultChange(first_step, spec.name, spall))
         return spall
