@@ -114,7 +114,7 @@ class BallBearing:
         angle = np.linspace(-half_angle_rad, half_angle_rad, 201)
         gap = self.clearance_m * (np.cos(angle) / math.cos(half_angle_rad) - 1)
         density = self.load_factor * np.maximum(gap, 0.0) ** 1.5 * np.cos(angle)
-        return float(np.mean(density)) * 2 * half_angle_rad * self.ball_count / (2 * math.pi)
+        return float(np.mean(density[1:])) * 2 * half_angle_rad * self.ball_count / (2 * math.pi)
 
 
 def make_ball_bearing(
