@@ -10,6 +10,7 @@ import soundfile
 from gearsim_bringup import cli, offline
 from gearsim_io.bags import read_objects, read_record
 from gearsim_io.batches import SampleBatch
+from gearsim_io.importers import import_file
 from gearsim_sim.scenario import load_scenario
 from gearsim_sim.simulation import to_record
 
@@ -38,8 +39,8 @@ def test_bag_npz_and_wav_hold_the_same_samples(simulated, truth):
     record = read_record(simulated)
     np.testing.assert_array_equal(record.data, truth.data)
     arrays = np.load(simulated / "signals.npz")
-    np.testing.assert_array_equal(arrays["data"], truth.data)
-    assert arrays["channels"].tolist() == list(truth.channels)
+    for name, row in zip(truth.channels, truth.data, strict=True):
+        np.testing.assert_array_equal(arrays[name], row)
     sound, rate = soundfile.read(simulated / "signals.wav", dtype="float32")
     np.testing.assert_array_equal(sound.T, truth.data)
     assert rate == truth.sample_rate_hz
@@ -77,6 +78,18 @@ def test_info_and_diagnose_by_the_contract(simulated, capsys):
     assert finding["found_order"] == pytest.approx(4.8904, rel=3e-3)  # 12 balls, 7.12 / 38.5 mm
 
 
+def test_the_arrays_import_again(simulated, truth, capsys):
+    record = import_file(simulated / "signals.npz", "unsw_parallel")
+    np.testing.assert_array_equal(record.data, truth.data)
+    assert (record.channels, record.sample_rate_hz) == (truth.channels, truth.sample_rate_hz)
+    code, verdict, _ = run_json(
+        capsys, "diagnose", str(simulated / "signals.npz"), "--machine", "unsw_parallel"
+    )
+    assert code == 0
+    assert [(f["component"], f["fault"]) for f in verdict["findings"]] == [("bearing_3", "outer_race")]
+    assert verdict["speed_hz"]["source"] != "tacho"  # an array file has no tacho that the importer knows
+
+
 def test_an_existing_folder_is_refused_and_left_alone(tmp_path, capsys):
     taken = tmp_path / "taken"
     taken.mkdir()
@@ -89,7 +102,7 @@ def test_an_existing_folder_is_refused_and_left_alone(tmp_path, capsys):
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")])
 def test_whatever_interrupts_a_run_leaves_nothing_half_written(error, tmp_path, monkeypatch, capsys):
     class Breaking(offline._NpzSink):
-        def take(self, batches):
+        def take(self, _batches):
             raise error
 
     monkeypatch.setattr(offline, "_NpzSink", Breaking)

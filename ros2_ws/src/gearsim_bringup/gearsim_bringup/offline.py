@@ -125,7 +125,7 @@ class _BagSink:
 
 
 class _NpzSink:
-    """Arrays `data` (channels, samples), `tacho_<shaft>` and `encoder_<shaft>` (sample indices) and names."""
+    """Each channel as an array of its name, `tacho_<shaft>` and `encoder_<shaft>` in sample indices."""
 
     def __init__(self, simulation: Simulation, out: Path) -> None:
         self._simulation = simulation
@@ -148,11 +148,11 @@ class _NpzSink:
 
     def close(self) -> Path:
         machine = self._simulation.machine
-        arrays = {name: np.concatenate(parts) for name, parts in self._marks.items()}
+        names = [channel.name for channel in machine.channels]
+        arrays = dict(zip(names, np.concatenate(self._data, axis=1), strict=True))
+        arrays |= {name: np.concatenate(parts) for name, parts in self._marks.items()}
         np.savez(
             self._file,
-            data=np.concatenate(self._data, axis=1),
-            channels=np.array([channel.name for channel in machine.channels]),
             unit=np.array(self._unit),
             sample_rate_hz=np.array(self._simulation.scenario.sample_rate_hz),
             machine=np.array(machine.name),
