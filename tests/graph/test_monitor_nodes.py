@@ -150,6 +150,18 @@ def test_without_nameplate_it_says_so_and_goes_on_when_it_comes(rig):
     assert alarms[0].component == "bearing_3"
     rig.until(lambda: rig.status("envelope: machine")[0] == 0)
     rig.until(lambda: not states[-1].stale or "no samples" in states[-1].note)
+    rig.until(lambda: rig.status("envelope: stream")[2].get("windows") == "17")
+    # another machine: what was said of the old one is taken back
+    rig.nameplate(replace(machine(), name="other_rig"))
+    rig.until(lambda: rig.status("envelope: machine")[1] == "other_rig")
+    rig.send(next(iter(faulty().batches(512))))
+    rig.until(lambda: alarms[-1].level == 0 and states[-1].level == 0)
+    assert alarms[-1].reason == "another nameplate came"
+    # an impossible nameplate is refused and the node goes on with the one it has
+    broken = replace(machine().bearings[0], element_diameter_m=1.0)
+    rig.nameplate(replace(machine(), name="broken_rig", bearings=(broken,)))
+    rig.until(lambda: rig.status("envelope: machine")[0] == 2)
+    assert "nameplate refused" in rig.status("envelope: machine")[1]
     clean_end(node)
 
 

@@ -1,15 +1,14 @@
 """What all diagnostic nodes share: subscriptions, one thread that analyses, publishers, health.
 
-The executor's thread only receives: it turns messages into batches and queues them, so that the DDS queue
-(6 s at the usual batch size) is emptied while a window is analysed. One worker thread takes the batches in
-order, analyses and publishes.
+The executor's thread only receives and queues batches, so that the DDS queue (6 s at the usual batch size)
+is emptied while a window is analysed. One worker thread takes them in order, analyses and publishes.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -25,6 +24,7 @@ from rclpy.node import Node
 
 from gearsim_dsp.alarms import format_alarm
 from gearsim_dsp.nodes.parameters import MonitorParameters
+from gearsim_dsp.results import Alarm
 from gearsim_dsp.streams.feed import BatchQueue, StateKeeper, StreamStatus, StreamWatch
 from gearsim_dsp.streams.report import AlarmedMonitor, Outcome
 
@@ -71,8 +71,7 @@ class MonitorNode(Node):
         self._listen(qos.ACCEL)
         self._listen(qos.TACHO)
         self._worker = threading.Thread(target=self._work, name=f"{source} analysis", daemon=True)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(TICK_S, self._tick, clock=steady)
+        self._timer = self.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def finish(self) -> None:
         """Analyse what is queued, for a few seconds at most, and stop."""
@@ -126,8 +125,10 @@ class MonitorNode(Node):
     def _analyse(self, arrival_s: float, batch: Any) -> None:
         monitor, self._next_monitor = self._next_monitor, None
         if monitor is not None:
-            for alarm in self._monitor.withdraw("another nameplate came") if self._monitor else ():
-                self._send(self._alarm, alarm)
+            if self._monitor is not None:
+                self._tell(self._monitor.withdraw("another nameplate came"))
+                self._keeper.judged(self._monitor.present)
+                self._send(self._alarm_state, self._keeper.state)
             self._monitor = monitor
         assert self._monitor is not None
         for outcome in self._monitor.push(batch):
@@ -136,9 +137,7 @@ class MonitorNode(Node):
             self._worst_ms = max(self._worst_ms, self._latency_ms)
 
     def _publish(self, outcome: Outcome) -> None:
-        for alarm in outcome.alarms:
-            self._send(self._alarm, alarm)
-            self.get_logger().info(format_alarm(alarm))
+        self._tell(outcome.alarms)
         self._keeper.judged(outcome.present)
         if outcome.state_due:
             self._send(self._alarm_state, outcome.present)
@@ -146,6 +145,11 @@ class MonitorNode(Node):
             self._send(self._features, features)
         for spectrum in outcome.report.spectra:
             self._send(self._spectrum, spectrum)
+
+    def _tell(self, alarms: Iterable[Alarm]) -> None:
+        for alarm in alarms:
+            self._send(self._alarm, alarm)
+            self.get_logger().info(format_alarm(alarm))
 
     def _send(self, publisher: Any, result: Any) -> None:
         try:

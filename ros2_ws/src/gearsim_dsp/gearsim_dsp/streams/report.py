@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from gearsim_io.nameplate import Machine
+
 from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds
 from gearsim_dsp.quality import QualityIssue
-from gearsim_dsp.results import Alarm, AlarmState, Features, Spectrum
+from gearsim_dsp.results import Alarm, AlarmState, Features, Level, Spectrum
 from gearsim_dsp.streams.assembler import Batch, WindowAssembler
 
 __all__ = ["AlarmedMonitor", "Monitor", "Outcome", "Report"]
@@ -58,6 +60,7 @@ class Monitor(Protocol):
     """A streaming analysis: batches in, reports out, no clock."""
 
     source: str
+    machine: Machine
     assembler: WindowAssembler
 
     def push(self, batch: Batch) -> list[Report]:
@@ -113,6 +116,14 @@ class AlarmedMonitor:
         """The end of the input."""
         return [self._outcome(report) for report in self.monitor.finish()]
 
+    @property
+    def present(self) -> AlarmState:
+        """The alarms after the last window."""
+        if self._book is None:
+            frame_id = self.monitor.machine.name
+            return AlarmState(0, frame_id, self.monitor.source, Level.OK, True, "no window judged yet", 0)
+        return self._book.state(self._note, bool(self._note))
+
     def withdraw(self, why: str) -> list[Alarm]:
         """Take all alarms back, as of the last window judged."""
         if self._book is None:
@@ -135,7 +146,7 @@ class AlarmedMonitor:
         if report.judged:
             changes += book.judge(Judgement(report.last_ns, report.end_sample - 1, report.indications))
         due = book.state_due()
-        return Outcome(report, tuple(changes), book.state(note, bool(note)), due or bool(changes) or news)
+        return Outcome(report, tuple(changes), self.present, due or bool(changes) or news)
 
     def _back(self, report: Report, why: str) -> list[Alarm]:
         return self._book.reset(report.last_ns, report.end_sample - 1, why) if self._book else []
