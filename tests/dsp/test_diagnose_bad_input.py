@@ -167,3 +167,17 @@ def test_a_machine_known_by_its_shaft_alone_has_its_speed_told():
     diagnosis = diagnose_record(_record(x), plate)
     assert diagnosis.speed.value_hz == pytest.approx(24.7, rel=1e-3)
     assert not diagnosis.judged
+
+
+def test_a_nameplate_four_per_cent_off_is_told_and_the_fault_still_named():
+    x, turns = _faulty(speed=24.0)
+    x = (
+        x
+        + 0.3 * np.cos(2 * np.pi * turns)
+        + 0.3 * np.cos(4 * np.pi * turns)
+        + 0.3 * np.cos(6 * np.pi * turns)
+    )
+    diagnosis = diagnose_record(_record(x), machine(25.0))
+    assert diagnosis.speed.value_hz == pytest.approx(24.0, rel=1e-3)
+    assert "speed_off_nameplate" in _kinds(diagnosis)
+    assert [f.fault for f in diagnosis.findings] == ["outer_race"]

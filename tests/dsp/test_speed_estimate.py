@@ -73,3 +73,13 @@ def test_speed_over_windows_is_their_mean_with_a_tacho():
         pool.add([analyse_window(WindowInput(x, RATE, "ch_1", start, speed, plate))])
     assert pool.speed().value_hz == pytest.approx(25.0)
     assert pool.speed().source == "tacho"
+
+
+@pytest.mark.parametrize("error", [-0.04, 0.035])
+def test_a_nameplate_that_is_off_is_corrected(error):
+    rng = np.random.default_rng(4)
+    turns = turns_of(25.0, 4.0, RATE)
+    x = noise(rng, turns.size) + rotating_lines(turns, {1: 0.3, 2: 0.3, 3: 0.3, 4: 0.2})
+    speed = _estimate(x, machine(25.0 / (1 + error)))
+    assert speed.source == "estimated"
+    assert speed.value_hz == pytest.approx(25.0, rel=1e-3)

@@ -1,10 +1,10 @@
 """Speed of the reference shaft from the vibration alone: the comb of shaft and mesh lines that fits best.
 
-For every candidate speed within the nameplate's tolerance the evidence of all lines that turn with the
-shafts (harmonics of each shaft, gear meshes with their harmonics) is summed up: -ln of each line's tail
-probability over the local noise floor, capped so that no single line decides. This is the multi-order
-approach (Leclere, Andre and Antoni, Mech. Syst. Signal Process. 81 (2016) 371-388) with the evidence of a
-Fisher test as likelihood.
+For every candidate speed near the nameplate's the heights over the local noise floor of all lines that
+turn with the shafts (harmonics of each shaft, gear meshes with their harmonics) are summed up in
+decibels, capped so that no single line decides; speeds beyond the nameplate's tolerance count 0.7 of
+their sum. This is the multi-order approach (Leclere, Andre and Antoni, Mech. Syst. Signal Process. 81
+(2016) 371-388); that the comb is no noise is then shown by Fisher's test over its lines.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ _LINE_WIDTH = 0.25
 _TOP_DB = 40.0
 _CLEAR_DB = 6.0
 _RIVAL = 0.85
+_OUTSIDE = 0.7
+_REACH = 2.5
+_LEAST_REACH = 0.05
 _FALSE_ALARM = 1e-3
 _WIDE_HZ = (4.0, 65.0)
 
@@ -44,7 +47,7 @@ def shaft_line_orders(machine: Machine) -> NDArray[np.float64]:
 def estimate_speed(
     power: Sequence[NDArray[np.float64]], step_hz: float, averages: float, machine: Machine
 ) -> ShaftSpeed:
-    """The speed whose lines stand out most, within the nameplate's tolerance.
+    """The speed whose lines stand out most, within 5 % or 2.5 times the nameplate's tolerance.
 
     Parameters
     ----------
@@ -73,7 +76,7 @@ def estimate_speed(
     position = candidates[:, None] * orders / step_hz
     inside = (position > 2.0) & (position < evidence.size - 2)
     values = _match(position, peaks, heights) * inside
-    score = values.sum(axis=1)
+    score = values.sum(axis=1) * _weight(nominal, candidates)
     best = int(np.argmax(score))
     tail = _match(position[best], peaks, tails) * inside[best]
     # Without its strongest line, for one line alone is no comb.
@@ -137,9 +140,20 @@ def _match(
 
 
 def _candidates(nominal: ShaftSpeed, step_hz: float, top_order: float) -> NDArray[np.float64]:
-    low, high = nominal.ci95_hz if np.isfinite(nominal.value_hz) else _WIDE_HZ
+    low, high = _WIDE_HZ
+    if np.isfinite(nominal.value_hz):
+        reach = max(_REACH * nominal.relative_error, _LEAST_REACH)
+        low, high = nominal.value_hz * (1 - reach), nominal.value_hz * (1 + reach)
     spacing = 0.5 * _LINE_WIDTH * step_hz / top_order
     return np.arange(low, high + spacing, spacing)
+
+
+def _weight(nominal: ShaftSpeed, candidates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Less for speeds beyond the nameplate's tolerance: possible, but they must show more clearly."""
+    if not np.isfinite(nominal.value_hz):
+        return np.ones(candidates.size)
+    low, high = nominal.ci95_hz
+    return np.where((candidates >= low) & (candidates <= high), 1.0, _OUTSIDE)
 
 
 def _rival(score: NDArray[np.float64], candidates: NDArray[np.float64], best: float) -> float:
