@@ -104,6 +104,17 @@ def test_a_damaged_length_costs_nothing_or_one_piece(bag, original, tmp_path):
     assert report.skipped_bytes > 0
 
 
+def test_a_damaged_length_of_an_index_costs_nothing(bag, original, tmp_path):
+    """It leads into the middle of a later chunk, and must not take the chunks between along."""
+    data = (bag / "good_0.mcap").read_bytes()
+    found = list(pieces(data))
+    number = next(k for k, piece in enumerate(found) if piece.opcode == Opcode.MESSAGE_INDEX and k > 20)
+    for mask in (0x20, 0x40, 0x80):  # 8, 16 and 32 kB further on
+        folder = damaged(bag, tmp_path, lambda file, m=mask: flip_byte(file, found[number].start + 2, m))
+        saved, _ = save(folder, tmp_path)
+        assert saved == original, mask
+
+
 def test_the_first_piece_may_be_damaged_too(bag, original, tmp_path):
     """It announces the topics; the index at the end does so again."""
     chunks, _ = chunks_of(bag)

@@ -41,10 +41,11 @@ def position(data: bytes, type_name: str) -> Position | None:
 
 
 def without_padding(data: bytes, type_name: str) -> bytes:
-    """An angle batch without what Fast CDR appends to an empty list of doubles.
+    """An angle batch without what `rclpy.serialization` appends to an empty list of doubles.
 
-    It is four bytes of memory that mean nothing, and the `rosbags` library (0.11) refuses a message that
-    goes on behind its end. All other messages are given back as they are.
+    It is four bytes of memory that mean nothing (messages taken from DDS have none), and the `rosbags`
+    library (0.11) refuses a message that goes on behind its end. All other messages are given back as
+    they are.
     """
     if type_name not in ANGLE_BATCHES:
         return data

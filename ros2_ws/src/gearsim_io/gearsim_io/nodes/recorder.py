@@ -105,7 +105,6 @@ class Recorder(Node):
     def _write(self, name: str, data: bytes, published_ns: int) -> None:
         topic = self._topics[name]
         assert topic is not None
-        data = cdr.without_padding(data, topic.type)
         self._writer.add_info(topic)
         self._writer.write(name, self.get_clock().now().nanoseconds, data, published_ns)
         self._bytes += len(data)
