@@ -47,7 +47,7 @@ def test_tail_is_the_f_distribution():
 
 
 def test_line_rate_on_noise_is_the_nominal_one():
-    """The F correction matters: with the chi-square law alone the rate would be about three times too high."""
+    """The F correction matters: with the chi-square law alone the rate would be three times too high."""
     rng = np.random.default_rng(3)
     worth = 0.45 * 80
     hits = trials = 0
