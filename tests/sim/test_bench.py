@@ -22,7 +22,7 @@ def test_numpy_right_hand_sides_equal_the_model(kind):
     expected = gearbox.acceleration(state[:34], state[34:], moment, gearbox.known_inputs(50.0))
     inertia = np.diag(gearbox.system.mass)
     assert np.array_equal(found[:34], state[34:])
-    # The tables of the tuned one interpolate to 1e-9 of the mesh force.
+    # Tables interpolate to 1e-9 of the mesh force.
     assert found[34:] * inertia == pytest.approx(expected * inertia, abs=1e-5)
 
 

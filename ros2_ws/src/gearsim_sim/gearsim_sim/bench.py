@@ -1,7 +1,8 @@
 """How fast the 34-DOF model runs, beside scipy's RK45 on the same right-hand side in numpy.
 
-Two right-hand sides are offered to RK45: `PlainGearbox` is the equations as one writes them down,
-`VectorisedGearbox` is tuned (all balls at once, one matrix, tables in place of Fourier series).
+Two right-hand sides are offered to RK45: `PlainGearbox` is the equations as one writes them down in
+numpy, bearing by bearing, `VectorisedGearbox` is tuned (all balls at once, one matrix). Both take mesh
+stiffness and transmission error from the same tables as the compiled loop.
 """
 
 from __future__ import annotations
@@ -107,13 +108,13 @@ class PlainGearbox:
         self._interfaces = system.interfaces
         self._constant = system.inputs @ gearbox.known_inputs(LOAD_NM)
         self._bearings = gearbox.bearings
-        self._mesh, self._ratio = gearbox.mesh, gearbox.speed_ratio
+        self._mesh, self._ratio = _TabledMesh(gearbox), gearbox.speed_ratio
         self._nominal = gearbox.params.model.ball_bearing.nominal_stiffness_n_per_m
 
     def __call__(self, t: float, state: Array) -> Array:
         """The derivative."""
         x, v = np.split(state, 2)
-        q, rate = self._interfaces.T @ x, self._interfaces.T @ v
+        q = self._interfaces.T @ x
         turns = TURNS + SPEED_HZ * t
         g = self._nominal * q
         for i, bearing in enumerate(self._bearings):
@@ -125,11 +126,7 @@ class PlainGearbox:
             force = bearing.load_factor * gap**1.5
             g[2 * i] -= force @ cosine
             g[2 * i + 1] -= force @ sine
-        mesh, gear_turns = self._mesh, turns * self._ratio
-        error = mesh.error(turns, gear_turns)
-        error_rate = mesh.error_rate(turns, gear_turns, SPEED_HZ, SPEED_HZ * self._ratio)
-        linear = mesh.mean_stiffness_n_per_m * q[8] + mesh.damping_ns_per_m * rate[8]
-        g[8] = linear - mesh.force(q[8] + error, rate[8] + error_rate, turns)
+        g[8] = self._mesh.deviation(q[8], turns)
         force = self._constant + self._interfaces @ g - self._damping @ v - self._stiffness @ x
         return np.concatenate([v, force / self._mass])
 
@@ -155,10 +152,7 @@ class VectorisedGearbox:
         self._factors = np.array([[bearing.load_factor] for bearing in bearings])
         self._clearances = np.array([[bearing.clearance_m] for bearing in bearings])
         self._nominal = gearbox.params.model.ball_bearing.nominal_stiffness_n_per_m
-        mesh = gearbox.mesh
-        self._mesh = (mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m, mesh.pinion_teeth)
-        self._tables = [_split(one.table()) for one in (mesh.stiffness, mesh.pinion_error, mesh.gear_error)]
-        self._ratio = gearbox.speed_ratio
+        self._mesh = _TabledMesh(gearbox)
 
     def __call__(self, t: float, state: Array) -> Array:
         """The derivative."""
@@ -173,19 +167,29 @@ class VectorisedGearbox:
         g = self._nominal * q
         g[0:8:2] -= np.einsum("ij,ij->i", balls, cosines)
         g[1:8:2] -= np.einsum("ij,ij->i", balls, sines)
-        g[8] = self._mesh_force(q[8], turns)
+        g[8] = self._mesh.deviation(q[8], turns)
         result = np.empty_like(state)
         result[:size] = state[size:]
         result[size:] = self._linear @ state + self._interfaces @ g + self._constant
         return result
 
-    def _mesh_force(self, q: float, turns: float) -> float:
-        mean, damping, teeth = self._mesh
-        stiffness, _ = _look_up(self._tables[0], turns * teeth)
+
+class _TabledMesh:
+    """Force of the mesh beyond its linear part, from tables."""
+
+    def __init__(self, gearbox: Gearbox) -> None:
+        mesh = gearbox.mesh
+        self._mean, self._damping = mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m
+        self._teeth, self._ratio = mesh.pinion_teeth, gearbox.speed_ratio
+        self._tables = [_split(one.table()) for one in (mesh.stiffness, mesh.pinion_error, mesh.gear_error)]
+
+    def deviation(self, q: float, turns: float) -> float:
+        """At a compression `q` without transmission error."""
+        stiffness, _ = _look_up(self._tables[0], turns * self._teeth)
         e1, slope1 = _look_up(self._tables[1], turns)
         e2, slope2 = _look_up(self._tables[2], turns * self._ratio)
         rate = SPEED_HZ * (slope1 + self._ratio * slope2)
-        return (mean - stiffness) * q - stiffness * (e1 + e2) - damping * rate
+        return (self._mean - stiffness) * q - stiffness * (e1 + e2) - self._damping * rate
 
 
 def _split(table: Array) -> tuple[list[float], list[float]]:
