@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ __all__ = ["CombGrid", "CombScores", "comb_grid", "score_combs"]
 LINE_CAP = 12.0
 HARMONIC_OPTIONS = (2, 4, 8)
 SIDEBAND_HARMONICS = 3
+_TOTAL_STEP = 0.02
 _INDEPENDENT_TEMPLATES = 2.0  # the templates share lines; counted on noise, see docs/diagnosis.md
 
 
@@ -43,6 +45,7 @@ class CombScores:
     template: NDArray[np.intp]
 
 
+@lru_cache(maxsize=64)
 def comb_grid(
     order: float, half_width: float, order_step: float, lines: int, sideband_order: float, resolution: float
 ) -> CombGrid:
@@ -70,6 +73,8 @@ def comb_grid(
     sidebands = _index(positions, order_step, lines)
     if sideband_order <= 0:
         sidebands = np.full_like(sidebands, -1)
+    for array in (fundamentals, harmonics, sidebands):
+        array.flags.writeable = False  # the grid is shared by all channels of a window
     return CombGrid(fundamentals, harmonics, sidebands)
 
 
@@ -115,5 +120,17 @@ def _take(
 
 
 def _score(total: NDArray[np.float64], count: NDArray[np.int64]) -> NDArray[np.float64]:
-    p = comb_false_alarm(total, np.broadcast_to(count, total.shape))
-    return -np.log(np.maximum(p, 1e-300))
+    """-ln of the Gamma tail, from a table, rounded down by less than its step."""
+    table = _gamma_table()
+    place = np.minimum(total * (1.0 / _TOTAL_STEP), table.shape[1] - 1).astype(np.intp)
+    return np.asarray(table[np.broadcast_to(count, total.shape), place])
+
+
+@lru_cache(maxsize=1)
+def _gamma_table() -> NDArray[np.float64]:
+    most = max(HARMONIC_OPTIONS[-1], 3 * SIDEBAND_HARMONICS)
+    totals = np.arange(0.0, LINE_CAP * most + 2 * _TOTAL_STEP, _TOTAL_STEP)
+    rows = [np.zeros(totals.size)]
+    for count in range(1, most + 1):
+        rows.append(-np.log(np.maximum(comb_false_alarm(totals, count), 1e-300)))
+    return np.stack(rows)

@@ -72,11 +72,11 @@ def window_spectrum(
     samples: NDArray[np.float32] | NDArray[np.float64], sample_rate_hz: float
 ) -> WindowSpectrum:
     """Spectrum of a window without its mean; 4 % at either end are tapered against leakage."""
-    x = np.asarray(samples, dtype=np.float64)
+    x = samples
     if x.ndim != 1 or x.size < 64:
         raise InputError("window_spectrum", "samples", f"shape {x.shape}", "a vector of 64 samples or more")
-    taper = _taper(x.size)
-    centred = ((x - np.mean(x)) * taper).astype(np.float32)
+    mean = float(np.mean(x, dtype=np.float64))
+    centred = (x - x.dtype.type(mean)).astype(np.float32, copy=False) * _taper(x.size)
     return WindowSpectrum(sfft.rfft(centred), int(x.size), float(sample_rate_hz))
 
 
