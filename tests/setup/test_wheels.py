@@ -30,8 +30,14 @@ def put(site: Path, name: str, version: str, files: dict[str, str], record: bool
 
 def test_whole_distributions_are_left_alone(tmp_path: Path) -> None:
     put(tmp_path, "ruamel_yaml", "0.1", {"ruamel/yaml.py": "a = 1\n"})
-    put(tmp_path, "ros_std_msgs", "5.0", {"share/x.cmake": "long text of the wheel"})
+    put(
+        tmp_path,
+        "ros_std_msgs",
+        "5.0",
+        {"share/x.cmake": "of the wheel", "__pycache__/x.pyc": "of the wheel"},
+    )
     (tmp_path / "share/x.cmake").write_text("mended")
+    (tmp_path / "__pycache__/x.pyc").write_text("rewritten")
     put(tmp_path, "certifi", "2.0", {"cacert.pem": "theirs"})
     (tmp_path / "cacert.pem").write_text("theirs and those of this site")
     wanted = {"ruamel-yaml": "0.1", "ros-std-msgs": "5.0", "certifi": "2.0"}
