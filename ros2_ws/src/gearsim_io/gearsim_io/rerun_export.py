@@ -214,7 +214,8 @@ def _write(bag: Path | str, out: Path, overview: Overview, points_per_s: float, 
                     scene.add(decoded)
         for name, t_s, colour in overview.marks():
             scene.mark(name, t_s, colour)
-        final = replace(focus, zoom_limit=_round_up(scene.peaks["zoom"]), speed_span_hz=scene.speed_span_hz)
+        limit = _round_up(max(scene.peaks["zoom"], scene.peaks["accel"]))
+        final = replace(focus, limit=limit, speed_span_hz=scene.speed_span_hz)
         rr.send_blueprint(blueprint(final, picture), recording=stream)
         scene.flush()
         stream.disconnect()
@@ -225,11 +226,11 @@ def _write(bag: Path | str, out: Path, overview: Overview, points_per_s: float, 
 
 
 def _round_up(peak: float) -> float:
-    """A round number just above a peak."""
+    """A little more than the next of 1, 2, 5, 10 ..., so that the axis has a number near its end."""
     if peak <= 0:
         return 0.0
-    step = 10.0 ** math.floor(math.log10(peak)) / 2.0
-    return float(step * math.ceil(1.05 * peak / step))
+    decade = 10.0 ** math.floor(math.log10(peak))
+    return 1.08 * next(decade * step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if decade * step >= peak)
 
 
 def _is_early(message: BagMessage, decoded: Any, overview: Overview) -> bool:

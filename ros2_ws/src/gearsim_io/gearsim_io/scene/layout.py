@@ -30,8 +30,8 @@ class Focus:
     parts : str
         What the front channel sits close to, for the title of its spectrum.
     zooms : tuple of Zoom
-    zoom_limit : float
-        All zooms are drawn from minus to plus this value; 0 leaves it to the viewer.
+    limit : float
+        The front channel is drawn from minus to plus this value; 0 leaves it to the viewer.
     speed_span_hz : tuple of float
         Range of the speed's axis; infinite values leave it to the viewer.
     unit, axis_unit : str
@@ -46,7 +46,7 @@ class Focus:
     channels: tuple[str, ...]
     parts: str = ""
     zooms: tuple[Zoom, ...] = ()
-    zoom_limit: float = 0.0
+    limit: float = 0.0
     speed_span_hz: tuple[float, float] = (-math.inf, math.inf)
     unit: str = "m/s^2"
     axis_unit: str = "order"
@@ -83,7 +83,7 @@ def blueprint(focus: Focus, picture: bool = False) -> Any:
             (6, _log()) if focus.has("Alarm") else None,
         ),
     ]
-    shares = [3 if focus.has("AlarmState", "GroundTruth") else 1, 3, 4, 3]
+    shares = [4 if focus.has("AlarmState", "GroundTruth") else 1, 4, 5, 4]
     filled = [(row, share) for row, share in zip(rows, shares, strict=True) if row is not None]
     return rrb.Blueprint(
         rrb.Vertical(*[row for row, _ in filled], row_shares=[share for _, share in filled]),
@@ -110,14 +110,18 @@ def _waveforms(focus: Focus) -> Any:
             contents=["$origin/**", "/marks/accel/**"] if channel == focus.channel else "$origin/**",
             name=f"Acceleration {channel} [{focus.unit}]",
             plot_legend=_HIDDEN,
+            axis_y=_symmetric(focus) if channel == focus.channel else None,
         )
         for channel in focus.ordered
     ]
     return rrb.Tabs(*views, active_tab=0)
 
 
+def _symmetric(focus: Focus) -> Any:
+    return rrb.ScalarAxis(range=(-focus.limit, focus.limit)) if focus.limit else None
+
+
 def _zoom(zoom: Zoom, focus: Focus) -> Any:
-    limit = focus.zoom_limit
     span = rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=zoom.start_s),
         end=rr.TimeRangeBoundary.absolute(seconds=zoom.end_s),
@@ -127,7 +131,7 @@ def _zoom(zoom: Zoom, focus: Focus) -> Any:
         name=f"{zoom.name}: {zoom.channel} from {zoom.start_s:.2f} to {zoom.end_s:.2f} s [{focus.unit}]",
         plot_legend=_HIDDEN,
         axis_x=rrb.TimeAxis(view_range=span),
-        axis_y=rrb.ScalarAxis(range=(-limit, limit)) if limit else None,
+        axis_y=_symmetric(focus),
     )
 
 

@@ -60,9 +60,7 @@ class Overview:
 
     def focus(self) -> Focus:
         """Which channel and which moments to show first."""
-        worst = self.worst
-        wanted = worst.channel if worst is not None and worst.channel in self.channels else ""
-        channel = wanted or (self.channels[0] if self.channels else "")
+        channel = self._front()
         return Focus(
             channel=channel,
             channels=self.channels,
@@ -72,6 +70,17 @@ class Overview:
             axis_unit=self.axis_unit,
             kinds=frozenset(self.kinds),
         )
+
+    def _front(self) -> str:
+        """The channel nearest to the part that the alarm names, else the one that the alarm names."""
+        worst = self.worst
+        if worst is not None:
+            bearings = self.machine.bearings if self.machine is not None else ()
+            near = [name for b in bearings if b.name == worst.component for name in b.channels]
+            for name in (*near, worst.channel):
+                if name in self.channels:
+                    return str(name)
+        return self.channels[0] if self.channels else ""
 
     def _parts(self, channel: str) -> str:
         bearings = self.machine.bearings if self.machine is not None else ()

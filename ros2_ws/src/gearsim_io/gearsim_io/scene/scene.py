@@ -17,6 +17,7 @@ from gearsim_io.scene.waves import Outliner, cut
 
 _PER_CHANNEL = ("rms", "kurtosis", "crest_factor")
 _SNR = "_snr"
+_LEAST_KURTOSIS = 1.0  # no signal has less
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,12 +104,13 @@ class Scene:
 
     def mark(self, name: str, t_s: float, colour: style.Rgb) -> None:
         """Draw a moment into the plots of waveform and kurtosis (once their heights are known)."""
-        for root, low in (("accel", -1.0), ("kurtosis", 0.0)):
+        for root in ("accel", "kurtosis"):
             peak = self.peaks[root]
-            if peak > 0:
+            low = -peak if root == "accel" else _LEAST_KURTOSIS
+            if peak > low:
                 path = style.entity("marks", root, name)
                 self._canvas.line(path, f"{name}: {t_s:.2f} s", colour, width=2.0)
-                self._canvas.upright(path, t_s, low * peak, peak)
+                self._canvas.upright(path, t_s, low, peak)
 
     def flush(self) -> None:
         """Send everything."""

@@ -17,6 +17,7 @@ _WITHOUT_MARKERS = 30.0
 _HALF_WIDTH_LINES = 2
 _STICK_WIDTH = 1 / 200
 _CLEAR_DB = 10.0
+_LOWEST_SHOWN = 0.4
 
 
 def bars(msg: Any) -> Iterator[tuple[str, Any]]:
@@ -24,7 +25,7 @@ def bars(msg: Any) -> Iterator[tuple[str, Any]]:
     values = np.frombuffer(msg.values, dtype=np.float32)
     count = min(values.size, int(_end(msg) / msg.axis_step) + 1)
     values, axis = values[:count], msg.axis_start + msg.axis_step * np.arange(count)
-    rest = values.copy()
+    rest = np.where(axis < _start(msg), np.float32(0), values)
     root = style.entity("spectrum", msg.channel)
     wide = max(msg.axis_step, float(axis[-1] - axis[0]) * _STICK_WIDTH)
     for marker in sorted(msg.markers, key=_clarity, reverse=True):
@@ -46,6 +47,11 @@ def _end(msg: Any) -> float:
         return float(_WITHOUT_MARKERS if msg.axis_unit == "order" else math.inf)
     highest = max(marker.position for marker in msg.markers)
     return float(_HARMONICS_SHOWN * (best.position if _clarity(best) >= _CLEAR_DB else highest))
+
+
+def _start(msg: Any) -> float:
+    """Far below the lowest family there is only the rest of the mean, which would dwarf all else."""
+    return _LOWEST_SHOWN * min((float(marker.position) for marker in msg.markers), default=0.0)
 
 
 def _chart(axis: NDArray[Any], values: NDArray[Any], width: float, colour: style.Rgb) -> Any:
