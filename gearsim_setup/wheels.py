@@ -24,7 +24,6 @@ _NETWORK = re.compile(
     r"NewConnectionError|NameResolution|Network is unreachable|ConnectTimeout|ReadTimeout|Read timed out|"
     r"ConnectionReset|ConnectionError|ProxyError|SSLError|No matching distribution found",
 )
-_REWRITTEN = (".cmake", ".pyc")
 _STRAY = frozenset(
     ("PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "VIRTUAL_ENV", "LD_LIBRARY_PATH")
 )
@@ -108,7 +107,7 @@ def damaged(site: Path, wanted: dict[str, str]) -> list[str]:
 
     pip writes a distribution's RECORD last: one without it was cut off in the middle. With it, every
     file it lists must be there and not cut short. Longer ones are no damage (some sites add their own
-    certificates to certifi's); CMake files are mended, and bytecode is rewritten by Python itself.
+    certificates to certifi's); CMake files are mended, and bytecode is Python's own to write.
     """
     bad = []
     for info in sorted(site.glob("*.dist-info")):
@@ -125,11 +124,13 @@ def _whole(info: Path) -> bool:
     except OSError:
         return False
     for name, _, size in rows:
+        if name.endswith(".pyc"):
+            continue
         try:
             found = os.stat(info.parent / name).st_size
         except OSError:
             return False
-        if size and found < int(size) and not name.endswith(_REWRITTEN):
+        if size and found < int(size) and not name.endswith(".cmake"):
             return False
     return bool(rows)
 

@@ -37,7 +37,7 @@ def test_whole_distributions_are_left_alone(tmp_path: Path) -> None:
         {"share/x.cmake": "of the wheel", "__pycache__/x.pyc": "of the wheel"},
     )
     (tmp_path / "share/x.cmake").write_text("mended")
-    (tmp_path / "__pycache__/x.pyc").write_text("rewritten")
+    (tmp_path / "__pycache__/x.pyc").unlink()
     put(tmp_path, "certifi", "2.0", {"cacert.pem": "theirs"})
     (tmp_path / "cacert.pem").write_text("theirs and those of this site")
     wanted = {"ruamel-yaml": "0.1", "ros-std-msgs": "5.0", "certifi": "2.0"}
