@@ -219,7 +219,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line(ros_domain, tmp_path):
         ),
         (PLAYER, {}, "bag: got nothing, expected the folder of a bag"),
         (PLAYER, {"bag": "missing"}, "missing: got nothing there"),
-        (PLAYER, {"bag": "missing", "rate": 0.0}, "0.01 to 100.0"),
+        (PLAYER, {"bag": "missing", "rate": 0.0}, "from 0.01 to 100"),
         (VIEWER, {}, "out, connect, window: got none, expected at least one"),
         (VIEWER, {"out": "picture.png"}, "the name of a new .rrd file"),
     ],
@@ -243,6 +243,34 @@ def test_a_damaged_bag_plays_to_the_damage_and_says_so(ros_domain, tmp_path):
     assert "cut off" in line
     assert "./gearsim recover" in line
     assert "Traceback" not in player.output
+
+
+def test_a_second_ctrl_c_at_once_does_no_harm(ros_domain, tmp_path):
+    """From a terminal it comes twice: from the terminal and from the parent process."""
+    recorder = start_recorder(ros_domain, tmp_path / "bag")
+    source = Source(ros_domain)
+    source.wait_for_subscribers()
+    for batch in objects_of(make_record()):
+        source.send(batch)
+    recorder.send_signal(signal.SIGINT)
+    time.sleep(0.05)
+    recorder.send_signal(signal.SIGTERM)
+    assert recorder.wait() == 0, recorder.output
+    found = info(tmp_path / "bag")
+    assert found.problem == ""
+    assert found.totals.counts[qos.ACCEL.full_name] == 16, "what was under way is taken"
+
+
+def test_another_type_on_a_topic_is_told(ros_domain, tmp_path):
+    from std_msgs.msg import String
+
+    recorder = start_recorder(ros_domain, tmp_path / "bag")
+    node = ros_domain.node("stranger")
+    node.create_publisher(String, qos.ACCEL.full_name, 10)
+    line = recorder.wait_for("std_msgs/msg/String is there too")
+    assert qos.ACCEL.full_name in line
+    assert "expected gearsim_msgs/msg/SampleBatch alone" in line
+    assert recorder.stop() == 0
 
 
 def test_a_slow_subscriber_is_found_by_the_sample_index(ros_domain, tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gearsim_dsp import results
 from gearsim_io import rerun_export
-from gearsim_io.bags import BagWriter, StreamWriter
+from gearsim_io.bags import BagError, BagWriter, StreamWriter
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_io.health import Level
 from gearsim_io.machines import load_machine
@@ -151,6 +151,19 @@ def test_an_existing_file_is_kept_unless_told(bag, tmp_path):
     assert out.read_text() == "mine"
     rerun_export.export(bag, out, overwrite=True)
     rerun_says("verify", out)
+
+
+def test_a_full_disk_is_told(bag, tmp_path):
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("this user may not mount a small file system")
+    try:
+        with pytest.raises(BagError, match=r"out\.rrd: not written to the end"):
+            rerun_export.export(bag, place / "out.rrd", full=True)
+    finally:
+        subprocess.run(["umount", str(place)], check=True)
 
 
 @pytest.mark.parametrize(

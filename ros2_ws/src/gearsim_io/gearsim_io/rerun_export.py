@@ -176,6 +176,7 @@ def quiet_environment(viewer: Path, home: Path) -> Mapping[str, str]:
 
 
 def _look_through(bag: Path | str) -> Overview:
+    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun comes as an exception
     try:
         from gearsim_io.scene import look_through
     except ImportError:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +19,6 @@ from gearsim_io.qos import Qos
 
 METADATA = "metadata.yaml"
 VERSION = 9
-DISTRO = "kilted"
 # rosbag2's words for "no message yet"
 NEVER_NS = 2**63 - 1
 
@@ -111,7 +112,7 @@ def metadata(
             "relative_file_paths": [file_name],
             "files": [only_file],
             "custom_data": dict(custom) or None,
-            "ros_distro": DISTRO,
+            "ros_distro": os.environ.get("ROS_DISTRO") or "kilted",
         }
     }
 
@@ -134,6 +135,17 @@ def parse_qos(text: str) -> tuple[Qos, ...]:
         return tuple(Qos.from_rosbag2(entry) for entry in content)
     except (YAMLError, AttributeError, TypeError, ValueError):
         return ()
+
+
+def parse_custom_data(where: str, text: str) -> dict[str, str]:
+    """A JSON object as texts, as bags keep them; InputError if it is none."""
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(where, "custom_data", text, f"a JSON object ({error})") from None
+    if not isinstance(content, dict):
+        raise InputError(where, "custom_data", text, "a JSON object")
+    return {str(key): v if isinstance(v, str) else json.dumps(v) for key, v in content.items()}
 
 
 def bag_files(path: Path) -> tuple[Path, ...]:

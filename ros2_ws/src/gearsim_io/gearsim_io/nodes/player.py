@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -29,7 +28,6 @@ SIGNALS = tuple(t.type for t in (qos.ACCEL, qos.TACHO, qos.ENCODER, qos.MACHINE_
 SETTLE_S = 0.3
 STEP_S = 0.1
 PATIENCE_S = 5.0
-RATE_RANGE = (0.01, 100.0)
 
 
 @dataclass(frozen=True)
@@ -37,6 +35,8 @@ class PlayerParameters:
     """What a user may set; `rate` and `paused` also while it plays."""
 
     bag: str = parameter("", "folder of the bag, or one .mcap file")
+    rate: float = parameter(1.0, "bag seconds per second", 0.01, 100.0, live=True)
+    paused: bool = parameter(False, "stand still", live=True)
     loop: bool = parameter(False, "begin again at the end; sample indices then start again too")
     clock_hz: float = parameter(50.0, "how often /clock is sent; 0: not at all", 0.0, 1000.0)
     signals_only: bool = parameter(False, "leave out recorded features, spectra, alarms and diagnostics")
@@ -52,7 +52,7 @@ class Player(Node):
     def __init__(self) -> None:
         super().__init__("player", namespace=qos.NAMESPACE)
         self._given = declare_parameters(self, PlayerParameters)
-        self._timeline = self._declare_timeline()
+        self._timeline = Timeline(time.monotonic, self._given.rate, self._given.paused)
         if not self._given.bag:
             raise InputError("parameter of node player", "bag", "nothing", "the folder of a bag")
         self.exit_status: int | None = None
@@ -75,19 +75,6 @@ class Player(Node):
             self._ticking = self.create_timer(1.0 / self._given.clock_hz, self._send_clock, clock=steady)
         self._worker = threading.Thread(target=self._work, name="player", daemon=True)
         self._worker.start()
-
-    def _declare_timeline(self) -> Timeline:
-        low, high = RATE_RANGE
-        bounds = [FloatingPointRange(from_value=low, to_value=high)]
-        described = ParameterDescriptor(description="bag seconds per second", floating_point_range=bounds)
-        try:
-            rate = self.declare_parameter("rate", 1.0, described).value
-            pause = ParameterDescriptor(description="stand still")
-            paused = self.declare_parameter("paused", False, pause).value
-        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            expected = f"rate from {low} to {high}, with a point; paused true or false"
-            raise InputError("parameter of node player", "rate, paused", str(error), expected) from None
-        return Timeline(time.monotonic, rate, paused)
 
     def _on_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         for item in changed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -17,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from gearsim_io import cdr, definitions, qos
 from gearsim_io.bags import BagError, BagWriter, TopicInfo
+from gearsim_io.bags.layout import parse_custom_data
 from gearsim_io.errors import InputError
 from gearsim_io.nodes.health import HealthPublisher, Level
 from gearsim_io.nodes.parameters import declare_parameters, parameter
@@ -52,9 +52,14 @@ class Recorder(Node):
         self._all = given.all_topics
         self._gaps = cdr.GapCounter()
         self._topics: dict[str, TopicInfo | None] = {}  # None: cannot be recorded
+        self._mixed: set[str] = set()
         self._bytes = self._bytes_before = 0
+        # Never simulated time: it stands at 0 until the first /clock, and messages would lie years apart.
+        self._wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         self._last_message_s = 0.0
-        self._writer = BagWriter(given.bag, _custom_data(given.custom_data), sync_period_s=None)
+        self._writer = BagWriter(
+            given.bag, parse_custom_data("parameter of node recorder", given.custom_data), sync_period_s=None
+        )
         self._health = HealthPublisher(self)
         if not self._wanted:
             for topic in qos.TOPICS:
@@ -73,6 +78,8 @@ class Recorder(Node):
     def _discover(self) -> None:
         """Subscribe to what has appeared since the last time."""
         for name, types in self.get_topic_names_and_types():
+            if name in self._topics:
+                self._check_types(name, types)
             if name in self._topics or not self._is_wanted(name, types):
                 continue
             offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
@@ -83,6 +90,14 @@ class Recorder(Node):
                     latched=all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered),
                 )
                 self._subscribe(name, types[0], profile)
+
+    def _check_types(self, name: str, types: list[str]) -> None:
+        topic = self._topics[name]
+        others = [] if topic is None else [other for other in types if other != topic.type]
+        if others and name not in self._mixed:
+            self._mixed.add(name)
+            listed = ", ".join(others)
+            self.get_logger().warning(f"{name}: type {listed} is there too, expected {topic.type} alone")
 
     def _is_wanted(self, name: str, types: list[str]) -> bool:
         if self._wanted:
@@ -106,7 +121,7 @@ class Recorder(Node):
         topic = self._topics[name]
         assert topic is not None
         self._writer.add_info(topic)
-        self._writer.write(name, self.get_clock().now().nanoseconds, data, published_ns)
+        self._writer.write(name, self._wall.now().nanoseconds, data, published_ns)
         self._bytes += len(data)
         if topic.type in cdr.BATCHES:
             missing = self._gaps.add(name, data, topic.type)
@@ -172,19 +187,6 @@ class Recorder(Node):
             executor.spin_once(timeout_sec=0.05)
             now_s = time.monotonic()
         executor.shutdown()
-
-
-def _custom_data(text: str) -> dict[str, str]:
-    where = "parameter of node recorder"
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(where, "custom_data", text, f"a JSON object ({error})") from None
-    if not isinstance(content, dict):
-        raise InputError(where, "custom_data", text, "a JSON object")
-    return {
-        str(key): value if isinstance(value, str) else json.dumps(value) for key, value in content.items()
-    }
 
 
 def main(args: list[str] | None = None) -> int:
