@@ -36,14 +36,15 @@ def test_alarms_on_replay_equal_alarms_live_and_all_messages_are_the_same_bytes(
     outcome, bag = live
     alarms = messages(bag, qos.ALARM.full_name)
     assert len(alarms) == len(outcome.seen.alarms) > 0
-    first = outcome.seen.alarms[0][1]
-    assert (first.component, first.fault) == ("bearing_3", "outer_race")
+    named = {(alarm.component, alarm.fault) for _, alarm in outcome.seen.alarms if alarm.source == "envelope"}
+    assert named == {("bearing_3", "outer_race")}
     assert sum(len(data) for data in messages(bag, qos.ACCEL.full_name)) > 4 * 4 * SECONDS * 16384
     source = player(bag, rate=4.0, loop=False, listeners=len(MONITORS) + 1, signals_only=True)
     LiveRun(source, tmp_path / "log2", tmp_path / "again").run()
     for topic in SIGNALS:
         assert messages(tmp_path / "again", topic) == messages(bag, topic), topic
-    assert messages(tmp_path / "again", qos.ALARM.full_name) == alarms
+    # Which of two nodes speaks first at the same sample is the middleware's affair, what they say is not.
+    assert sorted(messages(tmp_path / "again", qos.ALARM.full_name)) == sorted(alarms)
 
 
 def test_run_ends_with_ctrl_c_and_leaves_a_sound_bag(ros_domain, tmp_path):
