@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 from gearsim_io.bags import BagWriter, StreamWriter
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.machines import load_machine

@@ -8,6 +8,7 @@ import sys
 
 import click
 import pytest
+
 from gearsim_bringup import cli
 from gearsim_bringup.ui import JobFailedError, plain
 from gearsim_io.errors import EnvironmentLackError, InputError

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import soundfile
+
 from gearsim_bringup import cli, offline
 from gearsim_io.bags import read_objects, read_record
 from gearsim_io.batches import SampleBatch

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from gearsim_bringup.processes import Graph, NodeSpec
 
 STUBBORN = """

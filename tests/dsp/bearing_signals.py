@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from gearsim_io.nameplate import Bearing, Channel, Machine, Shaft
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
+
+from gearsim_io.nameplate import Bearing, Channel, Machine, Shaft
 
 
 @dataclass(frozen=True)

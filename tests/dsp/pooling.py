@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gearsim_dsp.decide import Verdict, find_faults
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.speed import window_speed

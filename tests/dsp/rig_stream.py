@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from gearsim_io.batches import SampleBatch, TachoBatch
 from gearsim_io.nameplate import Bearing, Channel, Machine, Shaft
 from gearsim_io.record import PulseTrain, Record

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds, format_alarm
 from gearsim_dsp.results import Level
 from gearsim_io.errors import InputError
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 HOP_NS = 500_000_000
 LIMITS = Thresholds(warn=8.0, error=14.0, clear=3.5)

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 from bearing_signals import defect, noise, turns_of
+from scipy.signal import firwin, lfilter
+
 from gearsim_dsp.band_choice import choose_band, rolloff_hz
 from gearsim_dsp.kurtogram import fast_kurtogram
 from gearsim_io.errors import InputError
-from scipy.signal import firwin, lfilter
 
 RATE = 24_000.0
 LEAST_HZ = 500.0

@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bearing_signals import Signal, defect, machine, noise, rotating_lines, turns_of
+from pooling import pool_of, verdict_of
+from scipy import stats
+
 from gearsim_dsp.bands import Band
 from gearsim_dsp.decide import ALARM_PROBABILITY, MODULATION_LIMIT, find_faults, is_fault
 from gearsim_dsp.evidence import EvidencePool
@@ -12,8 +15,6 @@ from gearsim_dsp.kinematics import fault_families
 from gearsim_dsp.speed import nameplate_speed
 from gearsim_dsp.window import WindowInput, analyse_window
 from gearsim_io.nameplate import Bearing
-from pooling import pool_of, verdict_of
-from scipy import stats
 
 RATE = 16_000.0
 SPEED = 24.8

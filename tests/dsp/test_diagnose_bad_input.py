@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bearing_signals import defect, machine, noise, turns_of
+
 from gearsim_dsp.diagnose import Diagnosis, DiagnosisSettings, diagnose_record
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, hilbert, sosfiltfilt, zoom_fft
+
 from gearsim_dsp.diagnose import diagnose_record
 from gearsim_dsp.kinematics import fault_families
 from gearsim_io.importers import import_file
 from gearsim_io.machines import load_machine
-from scipy.signal import butter, hilbert, sosfiltfilt, zoom_fft
 
 pytestmark = pytest.mark.records
 

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 from bearing_signals import turns_of
+from scipy.signal import butter, hilbert, sosfiltfilt
+
 from gearsim_dsp.envelope import (
     envelope_spectrum,
     order_spectrum,
@@ -10,7 +12,6 @@ from gearsim_dsp.envelope import (
 )
 from gearsim_dsp.speed import Phase
 from gearsim_io.errors import InputError
-from scipy.signal import butter, hilbert, sosfiltfilt
 
 RATE = 20_000.0
 

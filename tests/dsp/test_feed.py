@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rig_stream import RATE_HZ, cut, record
+
 from gearsim_dsp.results import AlarmState
 from gearsim_dsp.streams.feed import BatchQueue, StateKeeper, StreamStatus, StreamWatch
 from gearsim_io.health import Health, Level
-from rig_stream import RATE_HZ, cut, record
 
 SAMPLES, TACHOS = cut(record(seconds=2.0), [512])
 

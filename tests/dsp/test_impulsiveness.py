@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from gearsim_dsp.impulsiveness import FULL_MODULATION_KURTOSIS, impulsiveness
 from gearsim_io.errors import InputError
 

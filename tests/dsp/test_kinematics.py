@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bearing_signals import machine
+
 from gearsim_dsp.kinematics import bearing_orders, fault_families, mesh_orders
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine

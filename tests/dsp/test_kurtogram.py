@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.signal import firwin
+
 from gearsim_dsp.kurtogram import fast_kurtogram, largest_level
 from gearsim_io.errors import InputError
-from scipy.signal import firwin
 
 N = 3 * 2**14
 LEVELS = 6

@@ -8,6 +8,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig_stream import BPFI_ORDER, BPFO_ORDER, RATE_HZ, cut, interleave, machine, record
+
 from gearsim_dsp.alarms import AlarmSettings
 from gearsim_dsp.decide import MODULATION_LIMIT, find_faults
 from gearsim_dsp.results import Level
@@ -18,9 +22,6 @@ from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_io.batches import SampleBatch
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Bearing
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from rig_stream import BPFI_ORDER, BPFO_ORDER, RATE_HZ, cut, interleave, machine, record
 
 MONITORS = {"envelope": EnvelopeMonitor, "kurtosis": KurtosisMonitor}
 

@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from scipy import stats
+
 from gearsim_dsp.noise_floor import (
     LineTail,
     comb_false_alarm,
@@ -8,7 +10,6 @@ from gearsim_dsp.noise_floor import (
     search_false_alarm,
 )
 from gearsim_io.errors import InputError
-from scipy import stats
 
 
 def _spectra(rng, windows, length, hop):

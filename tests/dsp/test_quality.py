@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bearing_signals import noise, rotating_lines, turns_of
+
 from gearsim_dsp.electrical import find_electrical_lines
 from gearsim_dsp.quality import check_samples
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from gearsim_dsp.decide import MODULATION_LIMIT, find_faults
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.speed import window_speed

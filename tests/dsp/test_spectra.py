@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
-from gearsim_dsp.spectra import good_length, welch_psd
-from gearsim_io.errors import InputError
 from scipy import fft as sfft
 from scipy.signal import welch
+
+from gearsim_dsp.spectra import good_length, welch_psd
+from gearsim_io.errors import InputError
 
 
 def test_good_length_is_the_largest_5_smooth_number_below():

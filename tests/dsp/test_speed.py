@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bearing_signals import machine, turns_of
+
 from gearsim_dsp.speed import Phase, phase_from_pulses, window_speed
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine, Shaft

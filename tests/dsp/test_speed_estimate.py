@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from bearing_signals import machine, noise, rotating_lines, turns_of
+
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.speed import nameplate_speed
 from gearsim_dsp.window import WindowInput, analyse_window

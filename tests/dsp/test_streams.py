@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig_stream import RATE_HZ, cut, interleave, machine, record
+
 from gearsim_dsp.streams.assembler import WindowAssembler, WindowSettings
 from gearsim_dsp.streams.ring import SignalBuffer
 from gearsim_dsp.streams.sequencer import Link, Sequencer
 from gearsim_io.batches import EncoderBatch
 from gearsim_io.errors import InputError
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from rig_stream import RATE_HZ, cut, interleave, machine, record
 
 SETTINGS = WindowSettings(window_s=0.5, hop_s=0.125, angle_wait_s=0.5)
 LENGTH, HOP = 4096, 1024

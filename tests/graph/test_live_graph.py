@@ -9,6 +9,7 @@ import sys
 import time
 
 import pytest
+
 from gearsim_bringup.live import MONITORS, LiveRun, player, simulator
 from gearsim_io import qos
 from gearsim_io.bags import read_bag

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from gearsim_io import qos
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "dsp"))

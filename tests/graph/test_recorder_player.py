@@ -8,12 +8,13 @@ import time
 
 import numpy as np
 import pytest
+from recordings import make_record, objects_of, write_bag
+
 from gearsim_io import definitions, qos
 from gearsim_io.bags import BagWriter, StreamWriter, info, read_bag, read_record, recover
 from gearsim_io.batches import SampleBatch
 from gearsim_io.machines import load_machine
 from gearsim_io.messages import from_msg, ros_types, to_msg
-from recordings import make_record, objects_of, write_bag
 
 pytestmark = pytest.mark.graph
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from gearsim_dsp.results import Level
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor

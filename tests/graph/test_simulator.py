@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+
 from gearsim_io import qos
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.messages import from_msg, stamp_ns

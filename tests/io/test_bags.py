@@ -14,6 +14,9 @@ import textwrap
 
 import numpy as np
 import pytest
+from recordings import flip_byte, make_record, write_bag
+from ruamel.yaml import YAML
+
 from gearsim_io import definitions, qos
 from gearsim_io.bags import (
     BagError,
@@ -29,8 +32,6 @@ from gearsim_io.bags import (
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine
 from gearsim_io.messages import pure_types, to_msg
-from recordings import flip_byte, make_record, write_bag
-from ruamel.yaml import YAML
 
 ACCEL, TACHO, ENCODER = "/gearsim/accel", "/gearsim/tacho", "/gearsim/encoder"
 MACHINE = "/gearsim/machine_info"

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from gearsim_io import definitions
 from gearsim_io.errors import InputError
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from recordings import make_record, objects_of
+
 from gearsim_io import cdr, definitions
 from gearsim_io.batches import SampleBatch, TachoBatch
 from gearsim_io.messages import pure_types, to_msg
-from recordings import make_record, objects_of
 
 NAMES = {SampleBatch: cdr.SAMPLE_BATCH, TachoBatch: cdr.TACHO_BATCH}
 

@@ -10,12 +10,13 @@ import h5py
 import numpy as np
 import pytest
 import soundfile
+from ruamel.yaml import YAML
+from scipy.io import savemat
+
 from gearsim_io.bags import info, read_machine, read_record
 from gearsim_io.errors import InputError
 from gearsim_io.importers import READERS, Overrides, import_file, import_to_bag, machine_for
 from gearsim_io.machines import load_machine
-from ruamel.yaml import YAML
-from scipy.io import savemat
 
 RATE = 1000.0
 SIGNAL = np.sin(np.arange(3000) * 0.37) * 2.0

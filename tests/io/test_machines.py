@@ -6,9 +6,10 @@ import math
 from copy import deepcopy
 
 import pytest
+from ruamel.yaml import YAML
+
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, machine_file, machine_names
-from ruamel.yaml import YAML
 
 NAMES = ("cwru_drive_end", "gear0", "hit_sq", "mfpt", "sq_gearbox", "unsw_parallel", "wt_hss")
 

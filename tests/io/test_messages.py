@@ -9,6 +9,9 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from gearsim_dsp import results
 from gearsim_io import cdr, definitions
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
@@ -16,8 +19,6 @@ from gearsim_io.errors import InputError
 from gearsim_io.health import Level
 from gearsim_io.machines import load_machine
 from gearsim_io.messages import from_msg, message_name, pure_types, to_msg
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 TEXT = st.text(
     st.characters(codec="utf-8", exclude_characters="\x00", exclude_categories=("Cs",)), max_size=9

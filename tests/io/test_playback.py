@@ -6,6 +6,7 @@ import threading
 import time
 
 import pytest
+
 from gearsim_io.bags import BagMessage
 from gearsim_io.playback import Playback, Timeline
 

@@ -6,12 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from recordings import make_record, objects_of, write_bag
+
 from gearsim_io import definitions, qos
 from gearsim_io.bags import BagWriter, StreamWriter, read_record
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.errors import InputError
 from gearsim_io.messages import pure_types, to_msg
-from recordings import make_record, objects_of, write_bag
 
 
 @pytest.fixture

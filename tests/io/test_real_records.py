@@ -7,11 +7,12 @@ import gzip
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
+
 from gearsim_io.bags import read_machine, read_record
 from gearsim_io.errors import InputError
 from gearsim_io.importers import Overrides, import_file, import_to_bag, machine_for
 from gearsim_io.machines import load_machine
-from scipy.io import loadmat
 
 pytestmark = pytest.mark.records
 G = 9.80665

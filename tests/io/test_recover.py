@@ -8,13 +8,14 @@ import shutil
 
 import numpy as np
 import pytest
-from gearsim_io.bags import BagWriter, StreamWriter, info, read_bag, recover
-from gearsim_io.bags.frames import MAGIC, pieces
-from gearsim_io.errors import InputError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from recordings import flip_byte, make_record, write_bag
+
+from gearsim_io.bags import BagWriter, StreamWriter, info, read_bag, recover
+from gearsim_io.bags.frames import MAGIC, pieces
+from gearsim_io.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from recordings import make_record, write_bag
+
 from gearsim_dsp import results
 from gearsim_io import rerun_export
 from gearsim_io.bags import BagError, BagWriter, StreamWriter
@@ -15,7 +17,6 @@ from gearsim_io.health import Level
 from gearsim_io.machines import load_machine
 from gearsim_io.scene import look_through
 from gearsim_io.scene.waves import Outliner, cut
-from recordings import make_record, write_bag
 
 SECOND = 1_000_000_000
 

@@ -8,6 +8,7 @@ import tarfile
 from pathlib import Path
 
 import pytest
+
 from gearsim_bringup import data
 from gearsim_bringup.ui import JobFailedError
 from gearsim_io.errors import EnvironmentLackError, InputError

@@ -7,6 +7,7 @@ acceleration on, at its sample, so that a test can see the sample at which it ca
 import dataclasses
 
 import numpy as np
+
 from gearsim_sim.engine import EngineOutput
 from gearsim_sim.events import Clear, FaultSpec, Inject, SetOperatingPoint
 

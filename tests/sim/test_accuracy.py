@@ -8,6 +8,9 @@ of forces that stand still.
 
 import numpy as np
 import pytest
+from oracles.plain_lpm34 import Plain
+from scipy.integrate import solve_ivp
+
 from gearsim_sim.engine import DEFAULT_SITES
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.integrate.modes import complex_modes
@@ -18,8 +21,6 @@ from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.parallel import BEARINGS
 from gearsim_sim.schedule import ActiveFault, Ramp, Schedule
 from gearsim_sim.stepper import Stepper
-from oracles.plain_lpm34 import Plain
-from scipy.integrate import solve_ivp
 
 RATE_HZ, DURATION_S, TURNS, SPEED_HZ, LOAD_NM = 65536.0, 0.025, 0.5, 10.0, 50.0
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gearsim_sim.bench import (
     PlainGearbox,
     VectorisedGearbox,

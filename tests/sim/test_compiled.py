@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from gearsim_sim.integrate import compiled
 
 SOURCES = Path(compiled.__file__).parents[2]

@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
-from gearsim_sim.sensors.edges import EdgeFinder
 from rig_double import RigDouble
 from scipy.optimize import brentq
+
+from gearsim_sim.sensors.edges import EdgeFinder
 
 
 def _find(double, marks, samples, phase=0.0, cuts=(), far=0):

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, hilbert, sosfiltfilt
+
 from gearsim_io.errors import InputError
 from gearsim_sim.engine import DEFAULT_SITES, PROBE_NAMES, Engine
 from gearsim_sim.events import Clear, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.lpm34 import Moment, make_gearbox
 from gearsim_sim.params import load_parallel_params
-from scipy.signal import butter, hilbert, sosfiltfilt
 
 RATE_HZ = 65536.0
 SPALL = FaultSpec("outer_race_spall", "bearing_3", {"position_rad": -1.2})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from gearsim_sim.model.lpm34 import Moment, make_gearbox
 from gearsim_sim.model.statics import potential_energy, static_equilibrium
 from gearsim_sim.params import load_parallel_params

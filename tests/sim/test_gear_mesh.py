@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from gearsim_sim.integrate.pieces import (
     circle_table,
     cosine_sine,

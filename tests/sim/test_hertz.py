@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
 from gearsim_sim.model.hertz import ball_load_factor, point_contact_factor
 from gearsim_sim.model.lpm34 import make_gearbox
 from gearsim_sim.params import load_parallel_params
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 STEEL = 206e9 / (2 * (1 - 0.3**2))
 

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.signal import freqz
+
 from gearsim_sim.integrate.coefficients import cubic_weights, make_propagator
 from gearsim_sim.integrate.decimate import decimate, decimation_taps, padded_taps
 from gearsim_sim.integrate.kernel import (
@@ -14,8 +17,6 @@ from gearsim_sim.integrate.kernel import (
 )
 from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.model.assembly import Assembly
-from scipy.linalg import expm
-from scipy.signal import freqz
 
 STIFFNESS, DAMPING = 3e5, 20.0  # of the interface, beside its linear part
 FORCING_HZ = 90.0

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from oracles.plain_lpm34 import CB, KM, KTS, RG, RP, Plain, matrices
+
 from gearsim_sim.model.lpm34 import make_gearbox
 from gearsim_sim.params import load_parallel_params
-from oracles.plain_lpm34 import CB, KM, KTS, RG, RP, Plain, matrices
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Model parameters that a scenario replaces."""
 
 import pytest
+
 from gearsim_io.errors import InputError
 from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.overrides import override

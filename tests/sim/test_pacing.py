@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from gearsim_io.health import Level
 from gearsim_sim.outbox import Outbox
 from gearsim_sim.pacing import Pacer, PaceReport, StartGate, pace_status

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.errors import InputError
 from gearsim_sim.events import FaultSpec

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from gearsim_io.errors import InputError
 from gearsim_sim.events import Clear, Inject, SetOperatingPoint
 from gearsim_sim.scenario import load_scenario, scenario_names

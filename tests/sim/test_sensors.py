@@ -4,6 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy import signal, stats
+
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Channel, Machine, Shaft
 from gearsim_io.quantities import validate
@@ -12,7 +14,6 @@ from gearsim_sim.sensors.delay import Delay, taps
 from gearsim_sim.sensors.noise import generator, normal
 from gearsim_sim.sensors.rolloff import lowpass
 from gearsim_sim.sensors.rows import Accelerometer, SensorsModel, catalogue, sensor_table
-from scipy import signal, stats
 
 RATE = 65536.0
 

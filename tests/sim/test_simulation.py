@@ -4,13 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rig_double import LOOKAHEAD, RigDouble
+
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.errors import InputError
 from gearsim_io.messages import message_name, pure_types, to_msg
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.scenario import load_scenario
 from gearsim_sim.simulation import Simulation, simulate, to_record
-from rig_double import LOOKAHEAD, RigDouble
 
 RATE = 16384.0
 BATCH = 500

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+
 from gearsim_io.errors import InputError
 from gearsim_sim.engine import Engine
 from gearsim_sim.events import FaultSpec

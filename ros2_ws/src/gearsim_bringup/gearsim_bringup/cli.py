@@ -16,6 +16,7 @@ from pathlib import Path
 from types import FrameType
 
 import click
+
 from gearsim_io.errors import EnvironmentLackError, InputError
 
 FAILED, BAD_INPUT, LACKS, INTERRUPTED = 1, 2, 3, 130

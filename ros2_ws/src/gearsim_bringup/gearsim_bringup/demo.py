@@ -6,16 +6,15 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+from gearsim_bringup.live import MONITORS, LiveRun, Outcome, player, simulator
+from gearsim_bringup.tell import Teller
+from gearsim_bringup.ui import Voice
 from gearsim_io import cdr, qos
 from gearsim_io.bags import read_bag, read_machine
 from gearsim_io.datasets import data_folders, find_record
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_io.importers import import_to_bag
 from gearsim_sim.scenario import Scenario, load_scenario
-
-from gearsim_bringup.live import MONITORS, LiveRun, Outcome, player, simulator
-from gearsim_bringup.tell import Teller
-from gearsim_bringup.ui import Voice
 
 REAL_RECORD, REAL_MACHINE = "mfpt/OuterRaceFault_1.mat", "mfpt"
 

@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gearsim_io import qos
-from gearsim_io.errors import InputError
-
 from gearsim_bringup.processes import Graph, NodeProcess, NodeSpec
 from gearsim_bringup.ui import JobFailedError
+from gearsim_io import qos
+from gearsim_io.errors import InputError
 
 MONITORS = ("envelope", "kurtosis")
 _READY_S = 60.0

@@ -11,12 +11,13 @@ from typing import Protocol
 
 import numpy as np
 import soundfile
+from numpy.typing import NDArray
+
 from gearsim_io.bags import BagWriter, StreamWriter
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.errors import InputError
 from gearsim_sim.scenario import Scenario
 from gearsim_sim.simulation import Simulation
-from numpy.typing import NDArray
 
 FORMATS = ("mcap", "npz", "wav")
 Batch = SampleBatch | TachoBatch | EncoderBatch

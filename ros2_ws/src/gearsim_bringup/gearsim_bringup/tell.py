@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from gearsim_io.health import Level
-
 from gearsim_bringup.ui import Voice
+from gearsim_io.health import Level
 
 
 class Teller:

@@ -12,9 +12,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
-from gearsim_io.errors import InputError
-
 from gearsim_dsp.results import Alarm, AlarmState, Level
+from gearsim_io.errors import InputError
 
 __all__ = ["AlarmBook", "AlarmSettings", "Indication", "Judgement", "Thresholds", "format_alarm"]
 

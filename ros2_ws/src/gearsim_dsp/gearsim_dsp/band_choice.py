@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import fft as sfft
 
@@ -26,6 +25,7 @@ from gearsim_dsp.bands import TOP_SHARE, Band
 from gearsim_dsp.envelope import suppress_lines, window_spectrum
 from gearsim_dsp.kurtogram import Kurtogram, KurtogramNode, fast_kurtogram, largest_level
 from gearsim_dsp.spectra import welch_psd
+from gearsim_io.errors import InputError
 
 __all__ = ["BandChoice", "choose_band", "rolloff_hz"]
 

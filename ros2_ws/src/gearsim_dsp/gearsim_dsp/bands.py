@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gearsim_io.nameplate import Machine
 from scipy import fft as sfft
 
 from gearsim_dsp.kinematics import fault_families
+from gearsim_io.nameplate import Machine
 
 __all__ = ["Band", "BandPlan", "plan_bands"]
 

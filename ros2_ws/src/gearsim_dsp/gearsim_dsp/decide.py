@@ -20,13 +20,13 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from gearsim_io.nameplate import Machine
 
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.families import FamilyEvidence, FamilySearch
 from gearsim_dsp.kinematics import FaultFamily, fault_families
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.speed import ShaftSpeed
+from gearsim_io.nameplate import Machine
 
 __all__ = [
     "ALARM_PROBABILITY",

@@ -11,10 +11,6 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
-from gearsim_io.errors import InputError
-from gearsim_io.importers import machine_for
-from gearsim_io.nameplate import Machine
-from gearsim_io.record import Record
 
 from gearsim_dsp.decide import Finding, Verdict, find_faults
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
@@ -26,6 +22,10 @@ from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import Report
+from gearsim_io.errors import InputError
+from gearsim_io.importers import machine_for
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import Record
 
 _IMPACT_PROBABILITY = 1e-4
 

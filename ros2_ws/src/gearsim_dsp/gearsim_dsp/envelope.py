@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import fft as sfft
 from scipy.signal.windows import tukey
 
 from gearsim_dsp.speed import Phase
+from gearsim_io.errors import InputError
 
 __all__ = [
     "Envelopes",

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
 from numpy.typing import NDArray
 
 from gearsim_dsp.bands import Band
@@ -16,6 +14,8 @@ from gearsim_dsp.noise_floor import effective_averages
 from gearsim_dsp.speed import ShaftSpeed, nameplate_speed
 from gearsim_dsp.speed_estimate import estimate_speed
 from gearsim_dsp.window import BandSpectrum, WindowResult
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
 
 __all__ = ["ChannelSpectra", "EvidencePool"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.nameplate import Machine
 from numpy.typing import NDArray
 
 from gearsim_dsp.bands import Band
@@ -14,6 +13,7 @@ from gearsim_dsp.evidence import ChannelSpectra
 from gearsim_dsp.kinematics import FaultFamily
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
 from gearsim_dsp.speed import ShaftSpeed
+from gearsim_io.nameplate import Machine
 
 __all__ = ["BandLevel", "FamilyEvidence", "FamilySearch"]
 

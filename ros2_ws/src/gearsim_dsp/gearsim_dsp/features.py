@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
+
+from gearsim_io.errors import InputError
 
 __all__ = ["crest_factor", "kurtosis", "rms"]
 

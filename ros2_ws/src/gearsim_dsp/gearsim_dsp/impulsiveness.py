@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import special
+
+from gearsim_io.errors import InputError
 
 __all__ = ["FULL_MODULATION_KURTOSIS", "Impulsiveness", "impulsiveness"]
 

@@ -13,10 +13,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import fft as sfft
 from scipy.signal import firwin
+
+from gearsim_io.errors import InputError
 
 __all__ = ["Kurtogram", "KurtogramNode", "fast_kurtogram", "largest_level"]
 

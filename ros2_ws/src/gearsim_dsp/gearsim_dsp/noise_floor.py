@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import special
+
+from gearsim_io.errors import InputError
 
 __all__ = ["LineTail", "comb_false_alarm", "effective_averages", "local_floor", "search_false_alarm"]
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.health import Level
 from numpy.typing import NDArray
+
+from gearsim_io.health import Level
 
 __all__ = ["Alarm", "AlarmState", "FeatureValue", "Features", "Level", "Spectrum", "SpectrumMarker"]
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 from scipy import fft as sfft
+
+from gearsim_io.errors import InputError
 
 __all__ = ["Psd", "good_length", "welch_psd"]
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import PulseTrain
-from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 __all__ = ["Phase", "ShaftSpeed", "SpeedSource", "nameplate_speed", "phase_from_pulses", "window_speed"]
 

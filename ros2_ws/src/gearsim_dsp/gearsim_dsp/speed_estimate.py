@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from gearsim_io.nameplate import Machine
 from numpy.typing import NDArray
 
 from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.noise_floor import LineTail, comb_false_alarm, local_floor
 from gearsim_dsp.speed import ShaftSpeed, nameplate_speed
+from gearsim_io.nameplate import Machine
 
 __all__ = ["estimate_speed", "shaft_line_orders"]
 

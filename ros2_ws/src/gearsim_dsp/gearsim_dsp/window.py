@@ -13,8 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
 from numpy.typing import NDArray
 
 from gearsim_dsp.bands import Band, BandPlan, plan_bands
@@ -28,6 +26,8 @@ from gearsim_dsp.envelope import (
 )
 from gearsim_dsp.quality import QualityIssue, check_samples
 from gearsim_dsp.speed import Phase, ShaftSpeed
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
 
 __all__ = ["Band", "BandSpectrum", "LowSpectrum", "WindowInput", "WindowResult", "analyse_window"]
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
+from gearsim_io.errors import InputError
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.integrate.decimate import HALF_LENGTH_SAMPLES, decimate, padded_taps
 from gearsim_sim.model.assembly import Vector

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from pydantic import Field, model_validator
+
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, machine_file
 from gearsim_io.nameplate import Channel, Machine
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
-from pydantic import Field, model_validator
-
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.models import MODELS
 from gearsim_sim.sensors.rows import SensorsModel, SensorTable, sensor_table

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
+
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import EdgeTrain, PulseTrain, Record
-
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.history import History
 from gearsim_sim.models import MODELS, RunningModel

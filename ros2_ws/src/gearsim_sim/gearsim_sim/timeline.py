@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gearsim_io.errors import InputError
-
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.faults import fault_kind
 from gearsim_sim.model.faults.spall import Spall

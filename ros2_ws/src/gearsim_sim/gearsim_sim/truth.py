@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from gearsim_io.quantities import validate
-
 from gearsim_sim import __version__
 from gearsim_sim.events import Event, FaultSpec
 from gearsim_sim.model.faults import fault_kind

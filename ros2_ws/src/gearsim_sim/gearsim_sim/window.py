@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
+from gearsim_io.errors import InputError
 from gearsim_sim.engine import EngineOutput
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
+from gearsim_bringup.bench.figure import Figure, Goal
+from gearsim_bringup.ui import Voice
 from gearsim_dsp.results import Alarm
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor
 from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_sim.scenario import Scenario, load_scenario
 from gearsim_sim.simulation import simulate
-
-from gearsim_bringup.bench.figure import Figure, Goal
-from gearsim_bringup.ui import Voice
 
 SEEDS = (1, 2, 3, 4, 5)
 AFTER_S, FAULT_S = 6.0, 8.0

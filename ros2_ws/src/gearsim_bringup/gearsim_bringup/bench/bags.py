@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from gearsim_io import definitions, qos
-from gearsim_io.bags import BagWriter, recover
-from gearsim_io.batches import SampleBatch
-from gearsim_io.messages import pure_types, to_msg
 
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
+from gearsim_io import definitions, qos
+from gearsim_io.bags import BagWriter, recover
+from gearsim_io.batches import SampleBatch
+from gearsim_io.messages import pure_types, to_msg
 
 RATE_HZ = 65536.0
 CHANNELS = 8

@@ -6,11 +6,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from gearsim_dsp.diagnose import diagnose_record
-from gearsim_dsp.envelope import envelope_spectrum, squared_envelopes, window_spectrum
-from gearsim_dsp.kurtogram import fast_kurtogram
-from gearsim_io.machines import load_machine
-from gearsim_io.record import Record
 from numpy.typing import NDArray
 from scipy.fft import rfft
 from scipy.signal import butter, hilbert, sosfiltfilt
@@ -18,6 +13,11 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
+from gearsim_dsp.diagnose import diagnose_record
+from gearsim_dsp.envelope import envelope_spectrum, squared_envelopes, window_spectrum
+from gearsim_dsp.kurtogram import fast_kurtogram
+from gearsim_io.machines import load_machine
+from gearsim_io.record import Record
 
 RATE_HZ = 65536.0
 SECONDS = 10.0

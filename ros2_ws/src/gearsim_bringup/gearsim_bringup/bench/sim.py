@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gearsim_sim import bench
-
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
+from gearsim_sim import bench
 
 
 def measure(_voice: Voice) -> Iterator[Figure]:

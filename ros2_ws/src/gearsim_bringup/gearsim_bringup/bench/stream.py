@@ -137,11 +137,12 @@ class _Listener:
 
     def __init__(self, probe: Probe) -> None:
         import rclpy
-        from gearsim_io import qos
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
         from rclpy.signals import SignalHandlerOptions
+
+        from gearsim_io import qos
 
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)

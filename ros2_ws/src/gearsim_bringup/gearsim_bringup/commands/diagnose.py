@@ -35,10 +35,9 @@ def command(
     json_mode: bool,
 ) -> None:
     """Diagnose a bag or a measured file with the code of the diagnostic nodes."""
+    from gearsim_bringup.sources import open_source
     from gearsim_dsp.diagnose import diagnose_record
     from gearsim_io.importers import Overrides
-
-    from gearsim_bringup.sources import open_source
 
     voice = Voice(json_mode=json_mode)
     record, nameplate = open_source(source, machine, Overrides(rate, unit, columns, (), speed))

@@ -39,14 +39,13 @@ def command(bag: Path, rate: float, loop: bool, diagnose: bool) -> int:
 def _judge(bag: Path, spec: object) -> None:
     import tempfile
 
-    from gearsim_io import cdr, qos
-    from gearsim_io.bags import read_bag
-    from gearsim_io.errors import InputError
-
     from gearsim_bringup.live import LiveRun
     from gearsim_bringup.processes import NodeSpec
     from gearsim_bringup.tell import Teller
     from gearsim_bringup.ui import Voice
+    from gearsim_io import cdr, qos
+    from gearsim_io.bags import read_bag
+    from gearsim_io.errors import InputError
 
     assert isinstance(spec, NodeSpec)
     first = next(iter(read_bag(bag, (qos.ACCEL.full_name,))), None)

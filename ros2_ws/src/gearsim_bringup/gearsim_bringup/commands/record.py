@@ -23,9 +23,8 @@ EXAMPLE = """
 @click.option("--all", "everything", is_flag=True, help="Every topic there is.")
 def command(out: Path, topics: tuple[str, ...], everything: bool) -> int:
     """Record the rig's topics into a bag until Ctrl-C."""
-    from gearsim_io.nodes.recorder import main
-
     from gearsim_bringup.processes import NodeSpec, ParameterValue
+    from gearsim_io.nodes.recorder import main
 
     values: dict[str, ParameterValue] = {
         "bag": str(out),

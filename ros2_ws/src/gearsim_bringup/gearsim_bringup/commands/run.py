@@ -33,10 +33,9 @@ def command(
     Topics are under /gearsim, in the ROS domain of the environment; watch with `ros2 topic echo
     /gearsim/alarm`. Ctrl-C ends it.
     """
-    from gearsim_sim.scenario import load_scenario
-
     from gearsim_bringup.live import MONITORS, LiveRun, simulator
     from gearsim_bringup.tell import Teller
+    from gearsim_sim.scenario import load_scenario
 
     loaded = load_scenario(scenario)
     voice = Voice(json_mode=False)

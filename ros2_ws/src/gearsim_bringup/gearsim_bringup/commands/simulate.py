@@ -38,9 +38,8 @@ def command(
     scenario: str, seconds: float, out: Path, formats: tuple[str, ...], seed: int | None, json_mode: bool
 ) -> None:
     """Run a SCENARIO (a shipped name, or a YAML file) offline: bit for bit what the live rig sends."""
-    from gearsim_sim.scenario import load_scenario
-
     from gearsim_bringup.offline import simulate_to
+    from gearsim_sim.scenario import load_scenario
 
     voice = Voice(json_mode=json_mode)
     loaded = load_scenario(scenario)

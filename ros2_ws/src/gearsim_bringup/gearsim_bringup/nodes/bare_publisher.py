@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+from rclpy.node import Node
+
 from gearsim_io import qos
 from gearsim_io.batches import SampleBatch
 from gearsim_io.messages import ros_types, to_msg
 from gearsim_io.nodes.run import run_node
-from rclpy.node import Node
 
 RATE_HZ = 65536.0
 CHANNELS, SAMPLES = 8, 4096

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import rclpy
-from gearsim_io import qos
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+
+from gearsim_io import qos
 
 
 @dataclass

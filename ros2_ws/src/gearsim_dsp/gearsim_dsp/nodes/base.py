@@ -12,12 +12,6 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
-from gearsim_io import qos
-from gearsim_io.errors import InputError
-from gearsim_io.messages import from_msg, ros_types, to_msg
-from gearsim_io.nameplate import Machine
-from gearsim_io.nodes.health import HealthPublisher, Level
-from gearsim_io.nodes.parameters import declare_parameters
 from rclpy.clock import Clock, ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -27,6 +21,12 @@ from gearsim_dsp.nodes.parameters import MonitorParameters
 from gearsim_dsp.results import Alarm
 from gearsim_dsp.streams.feed import BatchQueue, StateKeeper, StreamStatus, StreamWatch
 from gearsim_dsp.streams.report import AlarmedMonitor, Outcome
+from gearsim_io import qos
+from gearsim_io.errors import InputError
+from gearsim_io.messages import from_msg, ros_types, to_msg
+from gearsim_io.nameplate import Machine
+from gearsim_io.nodes.health import HealthPublisher, Level
+from gearsim_io.nodes.parameters import declare_parameters
 
 TICK_S = 0.5
 DRAIN_S = 3.0

@@ -12,9 +12,8 @@ def main(args: list[str] | None = None) -> int:
     the libraries are still being loaded ends the process at once and silently.
     """
     previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from gearsim_io.nodes.run import run_node
-
     from gearsim_dsp.nodes.kurtosis_node import make_node
+    from gearsim_io.nodes.run import run_node
 
     signal.signal(signal.SIGINT, previous)
     return run_node(make_node, "kurtosis", args)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearsim_io.nameplate import Machine
-from gearsim_io.nodes.parameters import parameter
-
 from gearsim_dsp.nodes.base import MonitorNode
 from gearsim_dsp.nodes.parameters import MonitorParameters
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import AlarmedMonitor
+from gearsim_io.nameplate import Machine
+from gearsim_io.nodes.parameters import parameter
 
 SOURCE = "kurtosis"
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearsim_io.nodes.parameters import parameter
-
 from gearsim_dsp.alarms import AlarmSettings
 from gearsim_dsp.streams.assembler import WindowSettings
+from gearsim_io.nodes.parameters import parameter
 
 _WINDOW, _ALARMS = WindowSettings(), AlarmSettings()
 

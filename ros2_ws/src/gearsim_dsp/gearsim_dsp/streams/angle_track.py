@@ -7,10 +7,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from gearsim_io.batches import EncoderBatch, TachoBatch
-from gearsim_io.record import PulseTrain
 
 from gearsim_dsp.streams.sequencer import Link, Sequenced, Sequencer
+from gearsim_io.batches import EncoderBatch, TachoBatch
+from gearsim_io.record import PulseTrain
 
 __all__ = ["AngleTrack", "as_pulses"]
 

@@ -12,15 +12,15 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
-from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
-from gearsim_io.record import PulseTrain
 from numpy.typing import NDArray
 
 from gearsim_dsp.streams.angle_track import AngleTrack, as_pulses
 from gearsim_dsp.streams.ring import SignalBuffer
 from gearsim_dsp.streams.sequencer import Link, Sequenced, Sequencer
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import PulseTrain
 
 __all__ = ["AssemblerCounts", "Batch", "Window", "WindowAssembler", "WindowSettings"]
 

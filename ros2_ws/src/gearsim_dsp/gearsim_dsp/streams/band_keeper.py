@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from gearsim_io.nameplate import Machine
-
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.bands import Band, plan_bands
 from gearsim_dsp.quality import check_samples
 from gearsim_dsp.streams.assembler import Window
+from gearsim_io.nameplate import Machine
 
 __all__ = ["BandKeeper"]
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
 
 from gearsim_dsp.alarms import Indication
 from gearsim_dsp.bands import Band
@@ -23,6 +21,8 @@ from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, Window
 from gearsim_dsp.streams.band_keeper import BandKeeper
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
 
 __all__ = ["EnvelopeMonitor", "EnvelopeSettings", "group_of", "indications", "significance"]
 

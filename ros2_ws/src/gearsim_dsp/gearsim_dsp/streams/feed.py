@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from gearsim_io.batches import SampleBatch
-from gearsim_io.health import Level
 
 from gearsim_dsp.results import AlarmState
 from gearsim_dsp.streams.assembler import Batch, WindowAssembler
+from gearsim_io.batches import SampleBatch
+from gearsim_io.health import Level
 
 __all__ = ["BatchQueue", "StateKeeper", "StreamStatus", "StreamWatch", "Verdict"]
 

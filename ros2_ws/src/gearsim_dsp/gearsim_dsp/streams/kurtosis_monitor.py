@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
 
 from gearsim_dsp.alarms import Indication
 from gearsim_dsp.bands import TOP_SHARE, Band
@@ -20,6 +18,8 @@ from gearsim_dsp.results import Features, FeatureValue
 from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
 from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.report import Report
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
 
 __all__ = ["KurtosisMonitor", "KurtosisSettings"]
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from gearsim_io.nameplate import Machine
-
 from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Alarm, AlarmState, Features, Level, Spectrum
 from gearsim_dsp.streams.assembler import Batch, WindowAssembler
+from gearsim_io.nameplate import Machine
 
 __all__ = ["AlarmedMonitor", "Monitor", "Outcome", "Report"]
 

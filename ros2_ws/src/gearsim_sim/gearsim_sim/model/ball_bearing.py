@@ -14,9 +14,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.nameplate import Bearing
 from numpy.typing import NDArray
 
+from gearsim_io.nameplate import Bearing
 from gearsim_sim.model.hertz import ball_load_factor
 from gearsim_sim.params.parallel import BallBearing as BallBearingParams
 

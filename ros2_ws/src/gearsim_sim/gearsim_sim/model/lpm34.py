@@ -13,9 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
+from gearsim_io.errors import InputError
 from gearsim_sim.model.assembly import Assembly, LinearSystem
 from gearsim_sim.model.ball_bearing import BallBearing, make_ball_bearing
 from gearsim_sim.model.faults.spall import Spall

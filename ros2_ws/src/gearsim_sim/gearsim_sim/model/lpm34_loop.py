@@ -150,10 +150,12 @@ def spall_ball(row: Array, step: int, cage_turns: float, shaft_turns: float, dat
 
 @inlined
 def contact_force(
-    x: float, y: float, turns: float, bearing: int, data: Data, missing: Array, balls: int
+    x: float, y: float, c: float, s: float, bearing: int, data: Data, missing: Array, balls: int
 ) -> tuple[float, float]:
-    """Force of the inner ring on the outer ring; `missing` is (4, balls)."""
-    c, s = cosine_sine(turns, data.circle)
+    """Force of the inner ring on the outer ring; c and s turn into the frame of the cage.
+
+    `missing` is (4, balls).
+    """
     along, across = x * c + y * s, y * c - x * s
     clearance = data.bearings[bearing, 1]
     fx = 0.0
@@ -235,9 +237,13 @@ def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
             qx = interface_motion(sx, data.x.k, data.x.length, x_modes, nx, nx)
             qy = interface_motion(sy, data.y.k, data.y.length, y_modes, ny, ny)
             place_spalls(step, phases, drive, data, missing, touched)
+            cage, c, s = -1.0, 1.0, 0.0
             for b in range(BEARINGS):
+                if phases[2 + b] != cage:  # bearings of one kind on one shaft share their cage's angle
+                    cage = phases[2 + b]
+                    c, s = cosine_sine(cage, data.circle)
                 x, y = sx[qx + b], sy[qy + b]
-                fx, fy = contact_force(x, y, phases[2 + b], b, data, missing, balls)
+                fx, fy = contact_force(x, y, c, s, b, data, missing, balls)
                 forces[b] = data.nominal_stiffness * x - fx
                 forces[nx + b] = data.nominal_stiffness * y - fy
             for j in range(touched.shape[0]):

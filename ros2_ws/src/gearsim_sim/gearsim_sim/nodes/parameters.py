@@ -7,7 +7,6 @@ from typing import Any
 
 from gearsim_io.errors import InputError
 from gearsim_io.nodes.parameters import parameter
-
 from gearsim_sim.scenario import Scenario, load_scenario
 
 OF_SCENARIO = -1

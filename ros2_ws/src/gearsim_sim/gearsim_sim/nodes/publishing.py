@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gearsim_io import qos
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
-from gearsim_io.messages import ros_types, to_msg
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.time import Time
 
+from gearsim_io import qos
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.messages import ros_types, to_msg
 from gearsim_sim.outbox import Outbox
 from gearsim_sim.simulation import Batch, Simulation
 

@@ -6,14 +6,14 @@ import math
 import sys
 import time
 
-from gearsim_io import qos
-from gearsim_io.nodes.health import HealthPublisher, Level
-from gearsim_io.nodes.parameters import declare_parameters
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from gearsim_io import qos
+from gearsim_io.nodes.health import HealthPublisher, Level
+from gearsim_io.nodes.parameters import declare_parameters
 from gearsim_sim.nodes.parameters import SimulatorParameters
 from gearsim_sim.nodes.publishing import RigPublisher
 from gearsim_sim.nodes.services import RigServices

@@ -6,10 +6,10 @@ import json
 import math
 from typing import Any
 
-from gearsim_io.errors import InputError
 from gearsim_msgs.srv import ClearFault, InjectFault, SetOperatingPoint
 from rclpy.node import Node
 
+from gearsim_io.errors import InputError
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.simulation import Simulation
 

@@ -13,7 +13,6 @@ def main(args: list[str] | None = None) -> int:
     """
     previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
     from gearsim_io.nodes.run import run_node
-
     from gearsim_sim.nodes.rig import Simulator
 
     signal.signal(signal.SIGINT, previous)

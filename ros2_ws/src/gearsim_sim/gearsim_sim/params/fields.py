@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from gearsim_io.quantities import Si, Strict
 from pydantic import AfterValidator
+
+from gearsim_io.quantities import Si, Strict
 
 __all__ = ["Count", "Fraction", "SiKeyed", "Strict"]
 

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from pydantic import Field
+
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine
 from gearsim_io.quantities import Si, validate
-from pydantic import Field
-
 from gearsim_sim.params.fields import Count, Fraction, Strict
 from gearsim_sim.params.overrides import override
 

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from gearsim_io.errors import InputError
 from numpy.typing import NDArray
 
+from gearsim_io.errors import InputError
 from gearsim_sim.sensors.adc import Converter
 from gearsim_sim.sensors.delay import Delay
 from gearsim_sim.sensors.noise import Noise

@@ -14,10 +14,11 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
+from pydantic import Field, RootModel, ValidationInfo, model_validator
+
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Channel, Machine
 from gearsim_io.quantities import Si, Strict, load_yaml
-from pydantic import Field, RootModel, ValidationInfo, model_validator
 
 CATALOGUE = Path(__file__).parent / "catalogue.yaml"
 _OFF = (None, False, "off")

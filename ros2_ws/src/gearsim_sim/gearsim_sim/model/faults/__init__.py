@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from gearsim_io.errors import InputError
-
 from gearsim_sim.model.faults import inner_race_spall, outer_race_spall
 from gearsim_sim.model.faults.spall import FaultKind, Spall
 

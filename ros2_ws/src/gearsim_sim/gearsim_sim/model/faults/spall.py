@@ -20,7 +20,6 @@ from typing import Annotated, Any
 
 from gearsim_io.errors import InputError
 from gearsim_io.quantities import validate
-
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.model.ball_bearing import BallBearing
 from gearsim_sim.params.fields import Count, SiKeyed, Strict
