@@ -52,7 +52,9 @@ def main(root: str, argv: Sequence[str]) -> int:
     """Run one command of `./gearsim`; returns only when the program was not started."""
     places = Places(Path(root))
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupt)
+        # What nohup has switched off stays off.
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _interrupt)
     try:
         return _dispatch(places, list(argv))
     except KeyboardInterrupt:

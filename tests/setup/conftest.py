@@ -54,6 +54,7 @@ def standing(copy: Path) -> Path:
     (places.venv / "pyvenv.cfg").write_text("home = /usr/bin\nversion = 3.12.3\n")
     places.python.write_text(
         '#!/bin/sh\nprintf "%s\\n" "$@" > "$SAID.arguments"\nenv > "$SAID.environment"\n'
+        'grep SigIgn /proc/self/status > "$SAID.ignored"\n'
     )
     places.python.chmod(0o755)
     (places.install / "lib" / "python3.12" / "site-packages").mkdir(parents=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-SYSTEM_TOOLS = ("sh", "env", "cat", "printf")
+SYSTEM_TOOLS = ("sh", "env", "cat", "grep")
 
 
 def start(
@@ -246,6 +247,16 @@ def test_another_python_on_the_path_does_not_cause_a_rebuild_but_a_wish_does(
     done = start(standing, "info", env={**env, "GEARSIM_PYTHON": sys.executable})
     assert done.returncode == 3
     assert "setting up gearsim" in done.stderr
+
+
+def test_nohup_holds_for_the_program_too(
+    standing: Path, plain_environment: dict[str, str], said: Path
+) -> None:
+    command = ["nohup", sys.executable, str(standing / "gearsim"), "info"]
+    env = {**plain_environment, "SAID": str(said)}
+    subprocess.run(command, env=env, capture_output=True, check=True, timeout=60)
+    ignored = int(said.with_suffix(".ignored").read_text().split()[1], 16)
+    assert ignored & 1 << (signal.SIGHUP - 1)
 
 
 def test_a_second_start_waits_for_the_first(
