@@ -196,6 +196,44 @@ def place_spalls(
         missing[bearing, ball] += depth
 
 
+@inlined
+def bearing_forces(
+    sx: Array,
+    qx: int,
+    sy: Array,
+    qy: int,
+    phases: Array,
+    data: Data,
+    missing: Array,
+    forces: Array,
+    balls: int,
+) -> None:
+    """Forces of the four bearings beyond their linear part: first all in x, then all in y."""
+    cage, c, s = -1.0, 1.0, 0.0
+    for b in range(BEARINGS):
+        if phases[2 + b] != cage:  # bearings of one kind on one shaft share their cage's angle
+            cage = phases[2 + b]
+            c, s = cosine_sine(cage, data.circle)
+        x, y = sx[qx + b], sy[qy + b]
+        fx, fy = contact_force(x, y, c, s, b, data, missing, balls)
+        forces[b] = data.nominal_stiffness * x - fx
+        forces[X_INTERFACES + b] = data.nominal_stiffness * y - fy
+
+
+@inlined
+def put_motion(sx: Array, sy: Array, data: Data, forces: Array, row: Array) -> None:
+    """State rows of both parts and the interface forces, behind the first two entries of a row."""
+    at = 2
+    for j in range(data.x.state_rows.shape[0]):
+        row[at + j] = state_row(sx, data.x.state_rows[j], data.x.length)
+    at += data.x.state_rows.shape[0]
+    for j in range(data.y.state_rows.shape[0]):
+        row[at + j] = state_row(sy, data.y.state_rows[j], data.y.length)
+    at += data.y.state_rows.shape[0]
+    for j in range(INTERFACES):
+        row[at + j] = forces[j]
+
+
 def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
     """The compiled loop for these numbers of modes of the parts and of balls (padded)."""
     nx, ny = X_INTERFACES, Y_INTERFACES
@@ -237,15 +275,7 @@ def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
             qx = interface_motion(sx, data.x.k, data.x.length, x_modes, nx, nx)
             qy = interface_motion(sy, data.y.k, data.y.length, y_modes, ny, ny)
             place_spalls(step, phases, drive, data, missing, touched)
-            cage, c, s = -1.0, 1.0, 0.0
-            for b in range(BEARINGS):
-                if phases[2 + b] != cage:  # bearings of one kind on one shaft share their cage's angle
-                    cage = phases[2 + b]
-                    c, s = cosine_sine(cage, data.circle)
-                x, y = sx[qx + b], sy[qy + b]
-                fx, fy = contact_force(x, y, c, s, b, data, missing, balls)
-                forces[b] = data.nominal_stiffness * x - fx
-                forces[nx + b] = data.nominal_stiffness * y - fy
+            bearing_forces(sx, qx, sy, qy, phases, data, missing, forces, balls)
             for j in range(touched.shape[0]):
                 missing[touched[j, 0], touched[j, 1]] = 0.0
             forces[INTERFACES - 1] = -mesh_deviation(sy[qy + 4], phases[0], phases[1], speed, data)
@@ -262,15 +292,7 @@ def make_loop(x_modes: int, y_modes: int, balls: int) -> Callable[..., int]:
             if step % data.oversampling == 0:
                 motion[samples, 0] = passed
                 motion[samples, 1] = speed
-                at = 2
-                for j in range(data.x.state_rows.shape[0]):
-                    motion[samples, at + j] = state_row(sx, data.x.state_rows[j], data.x.length)
-                at += data.x.state_rows.shape[0]
-                for j in range(data.y.state_rows.shape[0]):
-                    motion[samples, at + j] = state_row(sy, data.y.state_rows[j], data.y.length)
-                at += data.y.state_rows.shape[0]
-                for j in range(INTERFACES):
-                    motion[samples, at + j] = forces[j]
+                put_motion(sx, sy, data, forces, motion[samples])
                 samples += 1
         return samples
 

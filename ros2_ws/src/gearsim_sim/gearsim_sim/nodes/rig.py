@@ -165,3 +165,6 @@ class Simulator(Node):
         text = f"the middleware refuses: {outbox.last_refusal}" if outbox.waiting else "sending"
         values = {"sent": outbox.sent, "waiting": outbox.waiting, "refused": outbox.refused}
         return self._health.report("stream", level, text, values)
+
+
+make_node = Simulator
