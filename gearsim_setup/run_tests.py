@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_WORKERS = 4
@@ -41,13 +42,35 @@ def _absolute(argument: str, cwd: Path) -> str:
     return f"{(cwd / path).resolve()}{separator}{rest}"
 
 
+class Interruption:
+    """A pytest plugin that notes whether somebody pressed Ctrl-C.
+
+    pytest-xdist ends a run that stops at a failure (`-x`) with the code of an interrupted one.
+    """
+
+    def __init__(self) -> None:
+        self.pressed = False
+
+    def pytest_keyboard_interrupt(self, excinfo: Any) -> None:
+        """Called by pytest with whatever ended the run early."""
+        self.pressed = excinfo.type is KeyboardInterrupt
+
+
+def exit_code(code: int, pressed: bool) -> int:
+    """Our exit code for pytest's."""
+    known = EXIT_CODES.get(code, 1)
+    return known if known != EXIT_CODES[2] or pressed else 1
+
+
 def main(argv: Sequence[str]) -> int:
     """Run pytest in the repository."""
     import pytest
 
     own = arguments(argv, Path.cwd(), len(os.sched_getaffinity(0)))
     os.chdir(ROOT)
-    return EXIT_CODES.get(int(pytest.main(own)), 1)
+    interruption = Interruption()
+    code = pytest.main(own, plugins=[interruption])
+    return exit_code(int(code), interruption.pressed)
 
 
 if __name__ == "__main__":
