@@ -6,6 +6,7 @@ Mirrors `gearsim_msgs/MachineInfo`. Loaded from the `nameplate` section of a mac
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -55,6 +56,17 @@ class Channel:
     axis: str = ""
     unit: str = "m/s^2"
     full_scale: float = float("nan")
+
+    def __eq__(self, other: object) -> bool:
+        """Field by field, where one unknown full scale equals another (NaN by itself equals nothing)."""
+        return isinstance(other, Channel) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[object, ...]:
+        full_scale = None if math.isnan(self.full_scale) else self.full_scale
+        return self.name, self.location, self.axis, self.unit, full_scale
 
 
 @dataclass(frozen=True, slots=True)
