@@ -49,6 +49,8 @@ def program_environment(places: Places, route: str, base: Mapping[str, str]) -> 
     env["GEARSIM_ROOT"] = str(places.root)
     env["GEARSIM_STATE"] = str(places.state)
     env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    # One file for each process of ROS; not in the user's home.
+    env.setdefault("ROS_LOG_DIR", str(places.state / "log" / "ros"))
     # Several nodes share few cores: more threads of the linear algebra would only wait for each other.
     env.setdefault("OPENBLAS_NUM_THREADS", "1")
     return env

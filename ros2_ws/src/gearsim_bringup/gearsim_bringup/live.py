@@ -16,6 +16,7 @@ from gearsim_io.errors import InputError
 
 MONITORS = ("envelope", "kurtosis")
 _READY_S = 60.0
+_DISCOVERY_S = 1.0  # in which another rig in this domain makes itself known
 
 
 @dataclass
@@ -70,7 +71,7 @@ class LiveRun:
 
         outcome = Outcome()
         with Watcher(self.on_alarm, self.on_truth) as watcher, Graph(self.log_dir) as graph:
-            watcher.spin(0.5)
+            watcher.spin(_DISCOVERY_S, lambda: bool(watcher.publishers_of(qos.ACCEL)))
             if watcher.publishers_of(qos.ACCEL):
                 expected = "none; end the other rig, or set another ROS_DOMAIN_ID"
                 raise InputError(qos.ACCEL.full_name, "publishers", "one already", expected)

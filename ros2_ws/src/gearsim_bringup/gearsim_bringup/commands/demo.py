@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, example, json_option
+from gearsim_bringup.options import ANY_PATH, FiniteRange, example, json_option
 from gearsim_bringup.ui import Voice
 
 
 @click.command("demo", epilog=example("./gearsim demo\n./gearsim demo --out out/my_demo"))
-@click.option("--seconds", default=30.0, type=click.FloatRange(min=15), help="Simulated seconds of the rig.")
+@click.option("--seconds", default=30.0, type=FiniteRange(min=15), help="Simulated seconds of the rig.")
 @click.option("--out", type=ANY_PATH, help="New folder for all files (default: out/demo-<date>-<time>).")
 @click.option("--real/--no-real", default=True, help="Also a measured record, where the data are present.")
 @json_option

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from gearsim_bringup.cli import BAD_INPUT
 from gearsim_bringup.options import ANY_PATH, example, json_option
 from gearsim_bringup.ui import Voice
 
@@ -20,12 +21,11 @@ def command(bag: Path, json_mode: bool) -> int:
     voice = Voice(json_mode=json_mode)
     found = bags.info(bag)
     voice.result(found.to_json())
-    voice.say(f"{found.path}: {found.size_bytes / 1e6:.1f} MB, {found.seconds:.3f} s")
+    voice.say(f"{found.path}: {found.size_bytes / 1e6:.1f} MB, recorded within {found.seconds:.3f} s")
     for name, topic in sorted(found.topics.items()):
         voice.say(f"  {found.totals.counts.get(name, 0):7d}  {name}  ({topic.type})")
     for key, value in sorted(found.custom_data.items()):
         voice.say(f"  {key}: {value}")
     if found.problem:
         voice.say(f"damaged: {found.problem}")
-        voice.say(f"save what is whole: ./gearsim recover {found.path} --out {found.path}_recovered")
-    return 1 if found.problem else 0
+    return BAD_INPUT if found.problem else 0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, example
+from gearsim_bringup.options import ANY_PATH, FiniteRange, example
 
 EXAMPLE = """
 ./gearsim play out/my_bag
@@ -16,7 +16,7 @@ EXAMPLE = """
 
 @click.command("play", epilog=example(EXAMPLE))
 @click.argument("bag", type=ANY_PATH)
-@click.option("--rate", default=1.0, type=click.FloatRange(0.01, 100), help="Times the recorded pace.")
+@click.option("--rate", default=1.0, type=FiniteRange(0.01, 100), help="Times the recorded pace.")
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @click.option("--diagnose", is_flag=True, help="Start the diagnostic nodes too and print their alarms.")
 def command(bag: Path, rate: float, loop: bool, diagnose: bool) -> int:

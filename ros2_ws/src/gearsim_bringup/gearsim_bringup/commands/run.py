@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, POSITIVE, example
+from gearsim_bringup.options import ANY_PATH, POSITIVE, FiniteRange, example
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
@@ -22,7 +22,7 @@ EXAMPLE = """
 @click.option(
     "--seconds", type=POSITIVE, help="End after so many simulated seconds (default: Ctrl-C ends it)."
 )
-@click.option("--rate", type=click.FloatRange(0, 1000), help="Times real time; 0 is as fast as it goes.")
+@click.option("--rate", type=FiniteRange(0, 1000), help="Times real time; 0 is as fast as it goes.")
 @click.option("--record", "bag", type=ANY_PATH, help="Record to this new bag.")
 @click.option("--view", "rrd", type=ANY_PATH, help="Write a rerun recording of the run.")
 def command(
@@ -35,9 +35,13 @@ def command(
     """
     from gearsim_bringup.live import MONITORS, LiveRun, simulator
     from gearsim_bringup.tell import Teller
+    from gearsim_io.errors import InputError
     from gearsim_sim.scenario import load_scenario
 
     loaded = load_scenario(scenario)
+    for path in (bag, rrd):
+        if path is not None and path.exists():
+            raise InputError(str(path), "", "it exists already", "a new name")
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)
     listeners = len(MONITORS) + (bag is not None) + (rrd is not None)
@@ -46,7 +50,9 @@ def command(
     with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
         voice.say(f"scenario {loaded.name}: {loaded.description}")
         voice.say("topics under /gearsim; Ctrl-C ends the run")
-        LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth).run()
-    for path in (bag, rrd):
-        if path is not None:
-            voice.say(f"written: {path}")
+        try:
+            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth).run()
+        finally:  # also after Ctrl-C, the usual end
+            for path in (bag, rrd):
+                if path is not None and path.exists():
+                    voice.say(f"written: {path}")

@@ -11,7 +11,7 @@ from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
 ./gearsim view out/demo/bag --out demo.rrd --png demo.png
-.venv/bin/rerun demo.rrd
+.venv/bin/rerun --bind 127.0.0.1 demo.rrd
 """
 
 
@@ -35,7 +35,7 @@ def command(
     voice = Voice(json_mode=json_mode)
     if out is not None:
         rerun_export.export(bag, out, full=full, overwrite=overwrite)
-        voice.say(f"written: {out}; open it with: .venv/bin/rerun {out}")
+        voice.say(f"written: {out}; open it with: .venv/bin/rerun --bind 127.0.0.1 {out}")
     if picture is not None:
         rerun_export.png(bag, picture, overwrite=overwrite)
         voice.say(f"written: {picture}")

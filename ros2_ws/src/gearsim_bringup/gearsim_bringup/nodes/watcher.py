@@ -12,6 +12,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from gearsim_io import qos
 
@@ -46,7 +47,7 @@ class Watcher:
 
     def __enter__(self) -> Watcher:
         self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         name = f"gearsim_cli_{os.getpid()}"
         namespace = qos.NAMESPACE
         self.node = Node(name, context=self._context, namespace=namespace, enable_rosout=False)

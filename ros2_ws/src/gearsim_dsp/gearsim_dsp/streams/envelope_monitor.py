@@ -190,7 +190,9 @@ class EnvelopeMonitor:
 
     def _spectrum(self, window: Window, result: WindowResult, verdict: Verdict) -> Spectrum:
         band = self._shown(result, verdict)
-        markers = [self._marker(e) for e in _of_channel(verdict, result.channel)]
+        # Without tacho the axis counts turns at the nameplate's speed, not at the speed found since.
+        scale = verdict.speed.value_hz / result.axis_speed_hz
+        markers = [self._marker(e, scale) for e in _of_channel(verdict, result.channel)]
         return Spectrum(
             t0_ns=window.t0_ns,
             frame_id=self.machine.name,
@@ -211,15 +213,15 @@ class EnvelopeMonitor:
             markers=tuple(markers),
         )
 
-    def _marker(self, evidence: FamilyEvidence) -> SpectrumMarker:
-        """At the order found where the family shows, else at the order expected."""
+    def _marker(self, evidence: FamilyEvidence, scale: float) -> SpectrumMarker:
+        """At the order found where the family shows, else at the order expected, times `scale`."""
         shows = evidence.snr_db >= _CLEAR_DB and math.isfinite(evidence.found_order)
         return SpectrumMarker(
             label=evidence.family.label,
             component=self._members(evidence),
-            position=evidence.found_order if shows else evidence.family.order,
+            position=scale * (evidence.found_order if shows else evidence.family.order),
             harmonics=_MARKED_HARMONICS,
-            sideband_spacing=evidence.family.sideband_order,
+            sideband_spacing=scale * evidence.family.sideband_order,
             snr_db=evidence.snr_db,
         )
 

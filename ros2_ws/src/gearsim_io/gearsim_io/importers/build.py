@@ -192,7 +192,7 @@ def _rate(
 def _number(where: str, content: Content, pattern: str) -> float:
     found = content.value(pattern)
     if found is None:
-        expected = f"a number of that name; the file has {content.listing()}"
+        expected = f"a number of that name, or --rate; the file has {content.listing()}"
         raise InputError(where, pattern, "not in the file", expected)
     name, value = found
     try:
@@ -220,7 +220,7 @@ def _value(path: Path, content: Content, source: ValueSettings | None, what: str
         if found is None:
             if source.optional:
                 return None
-            expected = f"a number of that name; the file has {content.listing()}"
+            expected = f"a number of that name, or --rate; the file has {content.listing()}"
             raise InputError(str(path), source.variable, "not in the file", expected)
         try:
             return float(found[1])
