@@ -22,7 +22,7 @@ def assemble(job: Job) -> None:
         When a step fails; what was completed before it stays.
     """
     places = job.places
-    job.report.line(f"setting up gearsim in {places.root} (ROS: {job.route})")
+    job.report.line(f"setting up gearsim in {places.root} (ROS: {job.route}); the first time takes minutes")
     shutil.rmtree(places.logs, ignore_errors=True)
     python = interpreter.choose(places)
     if system.provide(job, python):

@@ -110,7 +110,9 @@ class Overview:
         lines = [f"## {machine.name if machine is not None else 'Unknown machine'}"]
         if machine is not None and machine.description:
             lines.append(machine.description)
-        facts = f"{self.end_s:.1f} s, {len(self.channels)} channels at {self.sample_rate_hz:g} Hz"
+        count = len(self.channels)
+        channels = f"{count} channel" if count == 1 else f"{count} channels"
+        facts = f"{self.end_s:.1f} s, {channels} at {self.sample_rate_hz:g} Hz"
         point = [f"{self.speed_hz:g} Hz" if math.isfinite(self.speed_hz) else ""]
         point.append(f"{self.load_nm:g} N m" if math.isfinite(self.load_nm) else "")
         lines.append(", ".join([facts, *(text for text in point if text)]))
