@@ -13,8 +13,24 @@ from typing import TypeVar
 _T = TypeVar("_T", "Shaft", "Bearing")
 
 
-@dataclass(frozen=True, slots=True)
-class Shaft:
+class _Described:
+    """Compared field by field, where one unknown number equals another (NaN by itself equals nothing)."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Described) and type(other) is type(self) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[object, ...]:
+        values = (getattr(self, name) for name in self.__dataclass_fields__)  # type: ignore[attr-defined]
+        return tuple(None if isinstance(value, float) and math.isnan(value) else value for value in values)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shaft(_Described):
     """A shaft turning at `ratio` times the reference shaft; `nominal_speed_hz` is NaN if not known."""
 
     name: str
@@ -22,8 +38,8 @@ class Shaft:
     nominal_speed_hz: float
 
 
-@dataclass(frozen=True, slots=True)
-class GearMesh:
+@dataclass(frozen=True, slots=True, eq=False)
+class GearMesh(_Described):
     """A pair of meshing gears."""
 
     name: str
@@ -33,8 +49,8 @@ class GearMesh:
     driven_teeth: int
 
 
-@dataclass(frozen=True, slots=True)
-class Bearing:
+@dataclass(frozen=True, slots=True, eq=False)
+class Bearing(_Described):
     """Geometry of a rolling-element bearing (metres, radians); `channels` are close to it, nearest first."""
 
     name: str
@@ -47,8 +63,8 @@ class Bearing:
     channels: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Channel:
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel(_Described):
     """A measuring channel; `full_scale` in `unit`, NaN if not known."""
 
     name: str
@@ -57,20 +73,9 @@ class Channel:
     unit: str = "m/s^2"
     full_scale: float = float("nan")
 
-    def __eq__(self, other: object) -> bool:
-        """Field by field, where one unknown full scale equals another (NaN by itself equals nothing)."""
-        return isinstance(other, Channel) and self._key() == other._key()
 
-    def __hash__(self) -> int:
-        return hash(self._key())
-
-    def _key(self) -> tuple[object, ...]:
-        full_scale = None if math.isnan(self.full_scale) else self.full_scale
-        return self.name, self.location, self.axis, self.unit, full_scale
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
+@dataclass(frozen=True, slots=True, eq=False)
+class Machine(_Described):
     """The whole nameplate. Orders count turns of `reference_shaft`."""
 
     name: str
