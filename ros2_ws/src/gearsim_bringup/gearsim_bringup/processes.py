@@ -56,7 +56,8 @@ class NodeProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
-                env=dict(environment or os.environ),
+                # Unbuffered, so that the log has its lines in the order in which they were said.
+                env={**(environment or os.environ), "PYTHONUNBUFFERED": "1"},
                 # A session of its own: the terminal's Ctrl-C reaches us alone, and we end the nodes in order.
                 start_new_session=True,
                 preexec_fn=_die_with_parent,
