@@ -38,6 +38,7 @@ COMMANDS = {
 }
 # Done by the entry script before this program starts; listed here so that --help is complete.
 ENTRY_SCRIPT_COMMANDS = {
+    "setup": "Set up what is missing, nothing else.",
     "test": "Set up what is missing, then run the whole test suite.",
     "doctor": "Check the environment and say how to mend it.",
 }
