@@ -196,7 +196,7 @@ class MonitorNode(Node):
             for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name)):
                 if info.topic_type != topic.type:
                     who = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-                    if "_UNKNOWN_" in who:  # the name of a publisher may become known after its type, or never
+                    if "_UNKNOWN_" in who:  # a name may come after the type, or never
                         who = "a node without a name yet"
                     words = f"{topic.name}: {who} sends {info.topic_type}, expected {topic.type}"
                     self._watch.lasting(f"type {topic.name} {who}", words)
