@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+
 from gearsim_dsp.streams.feed import StreamWatch
 from gearsim_io import qos
 
