@@ -33,6 +33,7 @@ def generate_launch_description():
                 "bag": LaunchConfiguration("bag"),
                 "rate": ParameterValue(LaunchConfiguration("rate"), value_type=float),
                 "loop": ParameterValue(LaunchConfiguration("loop"), value_type=bool),
+                "signals_only": True,  # the bag's own alarms would mix with the new ones
                 "wait_for": ["accel"],
                 "min_subscribers": len(monitors),
             }
