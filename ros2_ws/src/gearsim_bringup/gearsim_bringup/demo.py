@@ -10,7 +10,7 @@ from gearsim_bringup.live import MONITORS, LiveRun, Outcome, player, simulator
 from gearsim_bringup.tell import Teller
 from gearsim_bringup.ui import Voice
 from gearsim_io import cdr, qos
-from gearsim_io.bags import read_bag, read_machine
+from gearsim_io.bags import read_bag
 from gearsim_io.datasets import data_folders, find_record
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_io.importers import import_to_bag
@@ -21,10 +21,11 @@ REAL_RECORD, REAL_MACHINE = "mfpt/OuterRaceFault_1.mat", "mfpt"
 
 @dataclasses.dataclass(frozen=True)
 class Delivery:
-    """Samples per channel found in a bag, and missing between them."""
+    """What a bag holds of the waveforms: samples per channel, how many miss between them, last log time."""
 
     samples: int
     lost: int
+    last_ns: int
 
 
 class Demo:
@@ -62,9 +63,9 @@ class Demo:
         delivery = deliveries(bag)
         sent = round(seconds * scenario.sample_rate_hz)
         began_ns = outcome.seen.truths[0][0] if outcome.seen.truths else 0
-        last_ns = last_sample_ns(bag)
         stream = "simulator: pacing"
-        achieved = seconds / ((last_ns - began_ns) * 1e-9) if last_ns > began_ns > 0 else None
+        took_s = (delivery.last_ns - began_ns) * 1e-9
+        achieved = seconds / took_s if began_ns > 0 and took_s > 0 else None
         alarm = first_alarm_after_fault(outcome, scenario)
         return {
             "simulated_seconds": seconds,
@@ -76,11 +77,12 @@ class Demo:
         }
 
     def _tell_summary(self, summary: dict[str, Any]) -> None:
-        say = self._voice.say
+        say, factor = self._voice.say, summary["real_time_factor"]
+        pace = "not known" if factor is None else f"{factor:.3f}"
         say()
         say(
             f"sent {summary['samples_sent']} samples of each channel, lost {summary['samples_lost']}; "
-            f"real-time factor {summary['real_time_factor']:.3f}"
+            f"real-time factor {pace}"
         )
         if summary["alarm_seconds"] is None:
             say("no alarm was raised for the fault")
@@ -130,22 +132,18 @@ class Demo:
         for file in files:
             say(f"  {file}")
         reason = alarms[0].reason if alarms else None
-        return {"record": path.name, "machine": _machine_name(bag), "alarm": reason, "files": files}
+        return {"record": path.name, "machine": REAL_MACHINE, "alarm": reason, "files": files}
 
 
 def deliveries(bag: Path) -> Delivery:
     """What arrived of the waveforms, by the batches' running index."""
-    counter, samples = cdr.GapCounter(), 0
+    counter, samples, last_ns = cdr.GapCounter(), 0, 0
     for message in read_bag(bag, (qos.ACCEL.full_name,)):
         place = cdr.position(message.data, message.type)
         counter.add(message.topic, message.data, message.type)
         samples += place.sample_count if place else 0
-    return Delivery(samples, counter.lost_samples)
-
-
-def last_sample_ns(bag: Path) -> int:
-    """Log time of the last batch of waveforms, 0 if there is none."""
-    return max((message.t_ns for message in read_bag(bag, (qos.ACCEL.full_name,))), default=0)
+        last_ns = max(last_ns, message.t_ns)
+    return Delivery(samples, counter.lost_samples, last_ns)
 
 
 def first_alarm_after_fault(outcome: Outcome, scenario: Scenario) -> dict[str, Any]:
@@ -166,8 +164,3 @@ def first_alarm_after_fault(outcome: Outcome, scenario: Scenario) -> dict[str, A
                 "alarm": alarm.reason,
             }
     return nothing
-
-
-def _machine_name(bag: Path) -> str | None:
-    machine = read_machine(bag)
-    return None if machine is None else machine.name

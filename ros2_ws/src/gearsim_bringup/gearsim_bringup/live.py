@@ -78,11 +78,9 @@ class LiveRun:
             for spec in self.sinks():
                 graph.start(spec)
             source = graph.start(self.source)
-            began = time.monotonic()
             if on_start is not None:
                 on_start(graph)
             self._watch(watcher, graph, source)
-            outcome.wall_seconds = time.monotonic() - began
             if graph.failed() is None:
                 self._drain(watcher)
             graph.stop()
@@ -136,7 +134,6 @@ class BadNodeError(InputError):
 class Outcome:
     """What a run brought; `seen` as in `nodes.watcher`."""
 
-    wall_seconds: float = 0.0
     seen: Any = None
 
 

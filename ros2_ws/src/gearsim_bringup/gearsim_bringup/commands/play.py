@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from gearsim_bringup.options import ANY_PATH, FiniteRange, example
+from gearsim_bringup.processes import NodeSpec
 
 EXAMPLE = """
 ./gearsim play out/my_bag
@@ -31,27 +32,24 @@ def command(bag: Path, rate: float, loop: bool, diagnose: bool) -> int:
 
         spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)
         return int(main(["gearsim", *spec.arguments()]))
-    spec = player(bag, rate=rate, loop=loop, listeners=len(MONITORS), signals_only=True)
-    _judge(bag, spec)
+    _judge(bag, player(bag, rate=rate, loop=loop, listeners=len(MONITORS), signals_only=True))
     return 0
 
 
-def _judge(bag: Path, spec: object) -> None:
+def _judge(bag: Path, source: NodeSpec) -> None:
     import tempfile
 
     from gearsim_bringup.live import LiveRun
-    from gearsim_bringup.processes import NodeSpec
     from gearsim_bringup.tell import Teller
     from gearsim_bringup.ui import Voice
     from gearsim_io import cdr, qos
     from gearsim_io.bags import read_bag
     from gearsim_io.errors import InputError
 
-    assert isinstance(spec, NodeSpec)
     first = next(iter(read_bag(bag, (qos.ACCEL.full_name,))), None)
     place = None if first is None else cdr.position(first.data, first.type)
     if place is None:
         raise InputError(str(bag), qos.ACCEL.full_name, "nothing", "samples to diagnose")
     teller = Teller(Voice(json_mode=False), place.sample_rate_hz)
     with tempfile.TemporaryDirectory(prefix="gearsim_play_") as logs:
-        LiveRun(spec, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth).run()
+        LiveRun(source, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth).run()
