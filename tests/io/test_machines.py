@@ -11,7 +11,17 @@ from ruamel.yaml import YAML
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, machine_file, machine_names
 
-NAMES = ("cwru_drive_end", "gear0", "hit_sq", "mfpt", "sq_gearbox", "unsw_parallel", "wt_hss")
+NAMES = (
+    "cwru_drive_end",
+    "gear0",
+    "hit_sq",
+    "mfpt",
+    "sq_gearbox",
+    "unsw_parallel",
+    "unsw_planetary",
+    "unsw_planetary_hunting",
+    "wt_hss",
+)
 
 
 def orders(bearing):
@@ -195,3 +205,103 @@ def test_unreadable_files_are_named(tmp_path):
         machine_file("no_such_machine")
     with pytest.raises(InputError, match=r"no_such\.yaml"):
         machine_file(tmp_path / "no_such.yaml")
+
+
+PLANETARY = {
+    "name": "toy",
+    "nameplate": {
+        "reference_shaft": "c",
+        "shafts": {"c": {"nominal_speed": number(2, "Hz")}, "s": {}, "p": {}},
+        "planetary_stages": {
+            "stage": {
+                "carrier_shaft": "c",
+                "sun_shaft": "s",
+                "planet_shaft": "p",
+                "input_member": "carrier",
+                "sun_teeth": number(40),
+                "ring_teeth": number(80),
+                "planet_teeth": number(20),
+                "planets": number(3),
+            }
+        },
+    },
+}
+
+
+def degrees(*angles):
+    return [number(angle, "deg") for angle in angles]
+
+
+def planetary(tmp_path, **changes):
+    content = deepcopy(PLANETARY)
+    content["nameplate"]["planetary_stages"]["stage"].update(changes)
+    path = tmp_path / "toy.yaml"
+    YAML().dump(content, path)
+    return load_machine(path)
+
+
+def test_planetary_speeds_as_in_thesis_table_7_3(tmp_path):
+    """Carrier 1, sun 3, planet -3 in space, which is -4 against the carrier."""
+    machine = planetary(tmp_path)
+    speeds = machine.planetary_stages[0].member_ratios()
+    assert speeds == {"carrier": 1.0, "ring": 0.0, "sun": 3.0, "planet": -4.0}
+    assert speeds["planet"] + speeds["carrier"] == -3.0
+    assert machine.shaft("s").ratio == 3.0
+    assert machine.shaft("p").ratio == 4.0
+
+
+@pytest.mark.parametrize(
+    ("still", "source", "expected"),
+    [
+        ("sun", "ring", {"carrier": 80 / 120}),  # Z_r / (Z_s + Z_r)
+        ("carrier", "sun", {"ring": -40 / 80}),  # a plain train, reversed
+        ("ring", "sun", {"carrier": 40 / 120}),
+    ],
+)
+def test_any_member_may_stand_still(tmp_path, still, source, expected):
+    shafts = {"carrier_shaft": "c", "sun_shaft": "s", "ring_shaft": "s"}
+    shafts[f"{still}_shaft"] = ""
+    free = [key for key in shafts if shafts[key] and not key.startswith(source)]
+    shafts[f"{source}_shaft"], shafts[free[0]] = "c", "s"
+    machine = planetary(tmp_path, input_member=source, **shafts)
+    speeds = machine.planetary_stages[0].member_ratios()
+    for member, ratio in expected.items():
+        assert speeds[member] == pytest.approx(ratio)
+    for name in ("sun", "ring"):  # the meshes roll without slip on the carrier
+        own = speeds[name] - speeds["carrier"]
+        teeth = getattr(machine.planetary_stages[0], f"{name}_teeth")
+        assert abs(own * teeth) == pytest.approx(abs(speeds["planet"]) * 20)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "expected"),
+    [
+        ({"ring_teeth": number(82)}, "ring_teeth", "80, the sun's teeth"),
+        ({"planets": number(7)}, "planet_angles", "multiples of 360/120"),
+        ({"planets": number(10)}, "planets", "at most 8"),
+        ({"planet_angles": degrees(0, 121, 240)}, "planet_angles", "120 or 123"),
+        ({"planet_angles": degrees(0, 30, 240)}, "planets", "clear of each other"),
+        ({"planet_angles": [number(0, "deg")]}, "planet_angles", "3 angles"),
+        ({"ring_shaft": "p"}, "stage", "exactly one"),
+        ({"input_member": "ring"}, "input_member", "has a shaft"),
+        ({"sun_shaft": "x"}, "sun_shaft", "one of the shafts"),
+    ],
+)  # fmt: skip
+def test_stages_that_cannot_be_put_together_are_refused(tmp_path, changes, field, expected):
+    with pytest.raises(InputError) as error:
+        planetary(tmp_path, **changes)
+    assert field in error.value.field
+    assert expected in error.value.expected
+
+
+def test_uneven_positions_on_the_least_mesh_angle_are_accepted(tmp_path):
+    stage = planetary(tmp_path, planet_angles=degrees(0, 117, 240)).planetary_stages[0]
+    assert stage.planet_angles_rad == pytest.approx([0, math.radians(117), math.radians(240)])
+
+
+def test_the_hunting_design_has_no_common_factors():
+    (stage,) = load_machine("unsw_planetary_hunting").planetary_stages
+    teeth = (stage.sun_teeth, stage.planet_teeth, stage.ring_teeth)
+    assert [math.gcd(a, b) for a, b in zip(teeth, teeth[1:] + teeth[:1], strict=True)] == [1, 1, 1]
+    usual = load_machine("unsw_planetary").planetary_stages[0]
+    assert stage.sun_teeth + stage.planet_teeth == usual.sun_teeth + usual.planet_teeth

@@ -184,7 +184,7 @@ def test_every_field_of_a_result_reaches_its_message():
 
 
 def test_nameplates_survive():
-    for name in ("unsw_parallel", "mfpt", "wt_hss", "sq_gearbox"):
+    for name in ("unsw_parallel", "unsw_planetary", "mfpt", "wt_hss", "sq_gearbox"):
         machine = load_machine(name)
         bare = dataclasses.replace(machine, sources={})
         for family, types in families():

@@ -15,7 +15,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field
 
 from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Bearing, Channel, GearMesh, Machine, Shaft
+from gearsim_io.nameplate import Bearing, Channel, GearMesh, Machine, PlanetaryStage, Shaft
+from gearsim_io.planetary import PlanetaryStageModel, Teeth, make_stage, stage_speeds
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 
 _FOLDER = Path(__file__).parent / "machines"
@@ -28,7 +29,6 @@ def _whole(value: float) -> int:
     return round(value)
 
 
-Teeth = Annotated[float, Si("", ge=1), AfterValidator(_whole)]
 Length = Annotated[float, Si("m", gt=0)]
 
 
@@ -70,11 +70,12 @@ class ChannelModel(Strict):
 
 
 class NameplateModel(Strict):
-    """The `nameplate` section; shafts, meshes, bearings and channels are keyed by their names."""
+    """The `nameplate` section; shafts, meshes, stages, bearings and channels are keyed by their names."""
 
     reference_shaft: str
     shafts: dict[str, ShaftModel] = Field(min_length=1)
     gear_meshes: dict[str, GearMeshModel] = Field(default_factory=dict)
+    planetary_stages: dict[str, PlanetaryStageModel] = Field(default_factory=dict)
     bearings: dict[str, BearingModel] = Field(default_factory=dict)
     channels: dict[str, ChannelModel] = Field(default_factory=dict)
     tacho_shafts: tuple[str, ...] = ()
@@ -151,13 +152,15 @@ def load_machine(name_or_path: str | Path) -> Machine:
     where = str(path)
     _check_references(where, plate)
     _check_bearings(where, plate)
-    ratios = _shaft_ratios(where, plate)
+    stages = tuple(make_stage(name, stage, where) for name, stage in plate.planetary_stages.items())
+    ratios = _shaft_ratios(where, plate, stages)
     return Machine(
         name=model.name,
         description=model.description,
         reference_shaft=plate.reference_shaft,
         shafts=tuple(_shaft(name, shaft, ratios, plate) for name, shaft in plate.shafts.items()),
         gear_meshes=tuple(GearMesh(name, **mesh.model_dump()) for name, mesh in plate.gear_meshes.items()),
+        planetary_stages=stages,
         bearings=tuple(_bearing(name, bearing) for name, bearing in plate.bearings.items()),
         channels=tuple(Channel(name, **channel.model_dump()) for name, channel in plate.channels.items()),
         tacho_shafts=plate.tacho_shafts,
@@ -199,6 +202,10 @@ def _check_references(where: str, plate: NameplateModel) -> None:
             raise InputError(
                 where, f"nameplate.gear_meshes.{name}.driven_shaft", mesh.driven_shaft, "another shaft"
             )
+    for name, stage in plate.planetary_stages.items():
+        members = ("carrier_shaft", "sun_shaft", "ring_shaft", "planet_shaft")
+        named = ((member, getattr(stage, member)) for member in members)
+        used += [(f"planetary_stages.{name}.{member}", shaft) for member, shaft in named if shaft]
     used += [(f"bearings.{name}.shaft", bearing.shaft) for name, bearing in plate.bearings.items()]
     used += [(f"tacho_shafts.{k}", shaft) for k, shaft in enumerate(plate.tacho_shafts)]
     used += [(f"encoder_shafts.{k}", shaft) for k, shaft in enumerate(plate.encoder_shafts)]
@@ -236,30 +243,33 @@ def _check_bearings(where: str, plate: NameplateModel) -> None:
             )
 
 
-def _shaft_ratios(where: str, plate: NameplateModel) -> dict[str, float]:
+def _shaft_ratios(where: str, plate: NameplateModel, stages: tuple[PlanetaryStage, ...]) -> dict[str, float]:
     """Speed of every shaft over that of the reference shaft; given, or from the teeth; never both at odds."""
     given = {name: shaft.ratio for name, shaft in plate.shafts.items() if shaft.ratio is not None}
     if given.get(plate.reference_shaft, 1.0) != 1.0:
         place = f"nameplate.shafts.{plate.reference_shaft}.ratio"
         raise InputError(where, place, given[plate.reference_shaft], "1, as it is the reference shaft")
+    links = [
+        (mesh.driving_shaft, mesh.driven_shaft, mesh.driving_teeth / mesh.driven_teeth, f"gear mesh {name}")
+        for name, mesh in plate.gear_meshes.items()
+    ]
+    links += [(*link, "a planetary stage") for link in stage_speeds(stages)]
     ratios = {plate.reference_shaft: 1.0, **given}
-    for _ in plate.gear_meshes:
-        for mesh in plate.gear_meshes.values():
-            step = mesh.driving_teeth / mesh.driven_teeth
-            if mesh.driving_shaft in ratios:
-                ratios.setdefault(mesh.driven_shaft, ratios[mesh.driving_shaft] * step)
-            elif mesh.driven_shaft in ratios:
-                ratios.setdefault(mesh.driving_shaft, ratios[mesh.driven_shaft] / step)
+    for _ in links:
+        for driving, driven, step, _who in links:
+            if driving in ratios:
+                ratios.setdefault(driven, ratios[driving] * step)
+            elif driven in ratios:
+                ratios.setdefault(driving, ratios[driven] / step)
     for name in plate.shafts:
         if name not in ratios:
             expected = "a ratio, as no gear mesh joins this shaft to the reference shaft"
             raise InputError(where, f"nameplate.shafts.{name}.ratio", "nothing", expected)
-    for name, mesh in plate.gear_meshes.items():
-        expected_ratio = ratios[mesh.driving_shaft] * mesh.driving_teeth / mesh.driven_teeth
-        found = ratios[mesh.driven_shaft]
-        if abs(found / expected_ratio - 1) > _RATIO_TOLERANCE:
-            place = f"nameplate.shafts.{mesh.driven_shaft}.ratio"
-            raise InputError(where, place, found, f"{expected_ratio:g}, by the teeth of gear mesh {name}")
+    for driving, driven, step, who in links:
+        expected_ratio = ratios[driving] * step
+        if abs(ratios[driven] / expected_ratio - 1) > _RATIO_TOLERANCE:
+            place = f"nameplate.shafts.{driven}.ratio"
+            raise InputError(where, place, ratios[driven], f"{expected_ratio:g}, by the teeth of {who}")
     return ratios
 
 

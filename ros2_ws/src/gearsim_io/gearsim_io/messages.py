@@ -13,7 +13,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar, get_args, get_type_hints, overload
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints, overload
 
 import numpy as np
 
@@ -31,6 +31,7 @@ _PLAIN_NAMES = {
     "Machine": "MachineInfo",
     "Shaft": "ShaftInfo",
     "GearMesh": "GearMeshInfo",
+    "PlanetaryStage": "PlanetaryStageInfo",
     "Bearing": "BearingInfo",
     "Channel": "ChannelInfo",
 }
@@ -246,6 +247,8 @@ def _from_field(value: Any, hint: Any) -> Any:
     if hint in (int, str, bool) or isinstance(value, str):
         return hint(value) if callable(hint) else value
     if isinstance(value, (array.array, np.ndarray)):
+        if get_origin(hint) is tuple:
+            return tuple(value.tolist())
         return np.frombuffer(value, dtype=value.dtype if isinstance(value, np.ndarray) else value.typecode)
     if isinstance(value, (list, tuple)):
         inner = origin_args[0] if origin_args else str

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 _T = TypeVar("_T", "Shaft", "Bearing")
+PLANETARY_MEMBERS = ("carrier", "sun", "ring")
 
 
 class _Described:
@@ -50,6 +51,44 @@ class GearMesh(_Described):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PlanetaryStage(_Described):
+    """A planetary gear stage; the member that stands still has no shaft (an empty name).
+
+    `planet_shaft` is the shaft under which the spin of the planets against the carrier is listed, so
+    that planet bearings have a shaft. `input_member` is "carrier", "sun" or "ring".
+    """
+
+    name: str
+    carrier_shaft: str
+    sun_shaft: str
+    ring_shaft: str
+    planet_shaft: str
+    input_member: str
+    sun_teeth: int
+    ring_teeth: int
+    planet_teeth: int
+    planet_angles_rad: tuple[float, ...]
+
+    @property
+    def fixed_member(self) -> str:
+        """The member that stands still: "carrier", "sun" or "ring"."""
+        return next(one for one in PLANETARY_MEMBERS if not getattr(self, f"{one}_shaft"))
+
+    def member_ratios(self) -> dict[str, float]:
+        """Signed speeds of carrier, sun and ring, and of the planets' spin against the carrier ("planet").
+
+        Relative to the input member; by Willis, (w_s - w_c) Z_s = -(w_r - w_c) Z_r.
+        """
+        sun, ring = float(self.sun_teeth), float(self.ring_teeth)
+        weight = {"sun": sun, "ring": ring, "carrier": -(sun + ring)}
+        last = next(one for one in weight if one not in (self.fixed_member, self.input_member))
+        speed = {self.fixed_member: 0.0, self.input_member: 1.0}
+        speed[last] = -weight[self.input_member] / weight[last]
+        speed["planet"] = (speed["ring"] - speed["carrier"]) * ring / self.planet_teeth
+        return speed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Bearing(_Described):
     """Geometry of a rolling-element bearing (metres, radians); `channels` are close to it, nearest first."""
 
@@ -83,6 +122,7 @@ class Machine(_Described):
     reference_shaft: str
     shafts: tuple[Shaft, ...]
     gear_meshes: tuple[GearMesh, ...] = ()
+    planetary_stages: tuple[PlanetaryStage, ...] = ()
     bearings: tuple[Bearing, ...] = ()
     channels: tuple[Channel, ...] = ()
     tacho_shafts: tuple[str, ...] = ()
