@@ -167,9 +167,7 @@ def _of_torques(wanted: Wanted, given: TorquesModel, drive: DriveLimits) -> Prof
     return Profile(speed, load, drive.step_s, drive.ratio, drive.inertia_kg_m2)
 
 
-def _motor(
-    given: TorquesModel, asked_hz: float, balance_nm: float, drive: DriveLimits
-) -> tuple[Motor, float]:
+def _motor(given: TorquesModel, asked: float, balance_nm: float, drive: DriveLimits) -> tuple[Motor, float]:
     """The motor, and its inner state at the start: it carries the load where the machine turns already."""
     motor = given.motor
     if motor.constant is not None:
