@@ -45,11 +45,11 @@ def gear_error(
     ]
     top = int(errors.harmonics) * teeth
     if physics.tooth_pitch and errors.pitch_rms_m > 0:
-        draws = _normal(seed, _PITCH_STREAM, wheel, teeth)
+        draws = normal_draws(seed, _PITCH_STREAM, wheel, teeth)
         parts.append(pitch_series(errors.pitch_rms_m * draws, top))
     if physics.tooth_surface and errors.surface_rms_m > 0:
-        draws = _normal(seed, _SURFACE_STREAM, wheel, 2 * top)
-        parts.append(_surface_series(errors.surface_rms_m, draws, top))
+        draws = normal_draws(seed, _SURFACE_STREAM, wheel, 2 * top)
+        parts.append(surface_series(errors.surface_rms_m, draws, top))
     return merged(*parts)
 
 
@@ -75,7 +75,7 @@ def pitch_series(pitch_errors_m: NDArray[np.float64], highest_order: int) -> Per
     )
 
 
-def _surface_series(rms_m: float, draws: NDArray[np.float64], highest_order: int) -> PeriodicSeries:
+def surface_series(rms_m: float, draws: NDArray[np.float64], highest_order: int) -> PeriodicSeries:
     """Random orders 1..highest with equal expected power and this expected rms."""
     scale = rms_m / np.sqrt(highest_order)
     return PeriodicSeries(
@@ -86,7 +86,7 @@ def _surface_series(rms_m: float, draws: NDArray[np.float64], highest_order: int
     )
 
 
-def _normal(seed: int, stream: int, wheel: int, count: int) -> NDArray[np.float64]:
+def normal_draws(seed: int, stream: int, wheel: int, count: int) -> NDArray[np.float64]:
     """Standard normal numbers of a counter-based generator: a function of its arguments only."""
     sequence = np.random.SeedSequence([seed, stream, wheel])
     return np.random.Generator(np.random.Philox(sequence)).standard_normal(count)

@@ -1,0 +1,271 @@
+"""Parameters of a planetary stage, read from the `model` section of its machine YAML.
+
+As for the parallel-shaft gearbox, attributes are in SI units, named by their suffix, and keys in YAML are
+the names without it. Teeth, positions of the planets and bearing geometry come from the nameplate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from gearsim_io.errors import InputError
+from gearsim_io.machines import load_machine, read_machine_file
+from gearsim_io.nameplate import Bearing, GearMesh, Machine, PlanetaryStage
+from gearsim_io.quantities import Si, validate
+from gearsim_sim.params.fields import Count, Strict
+from gearsim_sim.params.overrides import override
+from gearsim_sim.params.parallel import Drive
+
+MODEL_KIND = "planetary"
+
+Mass = Annotated[float, Si("kg", gt=0), Field(alias="mass")]
+Inertia = Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
+Stiffness = Annotated[float, Si("N/m", gt=0), Field(alias="stiffness")]
+Damping = Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
+Switch = Annotated[Count, Si("", ge=0, le=1)]
+
+
+class Teeth(Strict):
+    """What the nameplate does not tell of the teeth."""
+
+    module_m: Annotated[float, Si("m", gt=0), Field(alias="module")]
+    pressure_angle_rad: Annotated[float, Si("rad", gt=0, lt=math.pi / 4), Field(alias="pressure_angle")]
+    addendum: Annotated[float, Si("", gt=0, le=1.5)]
+    face_width_m: Annotated[float, Si("m", gt=0), Field(alias="face_width")]
+    sun_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="sun_bore_radius")]
+    planet_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="planet_bore_radius")]
+    ring_outer_radius_m: Annotated[float, Si("m", gt=0), Field(alias="ring_outer_radius")]
+
+
+class Body(Strict):
+    """A rigid wheel or the carrier."""
+
+    mass_kg: Mass
+    inertia_kg_m2: Inertia
+
+
+class Support(Strict):
+    """The same spring and damper in x and in y."""
+
+    stiffness_n_per_m: Stiffness
+    damping_ns_per_m: Damping
+
+
+class RingSupport(Support):
+    """How the ring is held, against turning too."""
+
+    torsional_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="torsional_stiffness")]
+    torsional_damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="torsional_damping")]
+
+
+class PlanetaryMesh(Strict):
+    """Stiffness and damping of the tooth contacts; contact ratios follow from the teeth."""
+
+    mean_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="mean_stiffness")]
+    damping_ns_per_m: Damping
+    pair_stiffness_n_per_m: Annotated[float, Si("N/m", ge=0), Field(alias="pair_stiffness")]
+    pair_stiffness_ratio: Annotated[float, Si("", ge=1, le=2)]
+    harmonics: Count
+
+
+class PlanetaryErrors(Strict):
+    """Transmission errors of the gears, (7.39) to (7.43) as smooth functions of angle."""
+
+    runout_m: Annotated[float, Si("m", ge=0), Field(alias="runout")]
+    runout_harmonics: Count
+    profile_m: Annotated[float, Si("m", ge=0), Field(alias="profile")]
+    profile_harmonics: Count
+    pitch_rms_m: Annotated[float, Si("m", ge=0), Field(alias="pitch_rms")]
+    surface_rms_m: Annotated[float, Si("m", ge=0), Field(alias="surface_rms")]
+    identical_planets: Switch
+
+
+class PlanetPositions(Strict):
+    """Errors of the planet pins along their circle, drawn with this standard deviation."""
+
+    error_m: Annotated[float, Si("m", ge=0), Field(alias="error")]
+
+
+class PlanetBearing(Strict):
+    """Planet bearings as Hertz contacts instead of linear springs; the springs' dampers stay."""
+
+    included: Switch
+    radial_clearance_m: Annotated[float, Si("m", ge=0), Field(alias="radial_clearance")]
+    nominal_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="nominal_stiffness")]
+
+
+class Casing(Strict):
+    """A mass that carries sun shaft and ring, which the thesis's model lacks."""
+
+    included: Switch
+    mass_kg: Mass
+    stiffness_n_per_m: Stiffness
+    damping_ns_per_m: Damping
+    sun_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="sun_stiffness")]
+    sun_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="sun_damping")]
+
+
+class FirstStage(Strict):
+    """The spur stage that drives the carrier."""
+
+    included: Switch
+    pinion_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="pinion_mass")]
+    pinion_inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="pinion_inertia")]
+    wheel_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="wheel_mass")]
+    wheel_inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="wheel_inertia")]
+    module_m: Annotated[float, Si("m", gt=0), Field(alias="module")]
+    shaft_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="shaft_stiffness")]
+    shaft_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="shaft_damping")]
+    coupling_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="coupling_stiffness")]
+    coupling_damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="coupling_damping")]
+
+
+class PlanetaryPhysics(Strict):
+    """Off switches, one for each physics."""
+
+    mesh_stiffness_variation: bool = True
+    runout: bool = True
+    tooth_profile: bool = True
+    tooth_pitch: bool = True
+    tooth_surface: bool = True
+    ball_passing: bool = True
+    clearance: bool = True
+    faults: bool = True
+
+
+class PlanetaryModel(Strict):
+    """The `model` section."""
+
+    kind: Literal["planetary"]
+    drive: Drive
+    teeth: Teeth
+    carrier: Body
+    sun: Body
+    ring: Body
+    planet: Body
+    planet_seat: Support
+    ring_support: RingSupport
+    sun_support: Support
+    carrier_on_sun: Support
+    mesh: PlanetaryMesh
+    gear_errors: PlanetaryErrors
+    planet_positions: PlanetPositions
+    planet_bearing: PlanetBearing
+    casing: Casing
+    first_stage: FirstStage
+
+
+class PlanetaryParams(Strict):
+    """Everything that the planetary model needs: `model` section, nameplate, switches."""
+
+    where: str
+    model: PlanetaryModel
+    stage: PlanetaryStage
+    bearings: tuple[Bearing, ...]  # one for each planet, or none
+    first_mesh: GearMesh | None
+    physics: PlanetaryPhysics = PlanetaryPhysics()
+
+    @property
+    def planets(self) -> int:
+        """Number of planets."""
+        return len(self.stage.planet_angles_rad)
+
+    def with_physics(self, **switches: bool) -> PlanetaryParams:
+        """The same machine with some physics switched (`runout=False`)."""
+        return self.model_copy(update={"physics": self.physics.model_copy(update=switches)})
+
+
+def load_planetary_params(
+    machine: str | Path = "unsw_planetary", overrides: Mapping[str, Any] | None = None, source: str = ""
+) -> PlanetaryParams:
+    """Parameters of a planetary machine.
+
+    Parameters
+    ----------
+    machine : str or Path
+        Name of a shipped machine description or path of a YAML file.
+    overrides : mapping, optional
+        Dotted names of the `model` section and the numbers that replace it (see `override`).
+    source : str
+        Where the overrides come from, for errors.
+
+    Raises
+    ------
+    InputError
+        If there is no usable `model` section, a number lacks unit or source, or it contradicts the
+        nameplate.
+    """
+    plate = load_machine(machine)
+    path, content = read_machine_file(machine)
+    where = f"{path}: model"
+    section = content.get("model")
+    if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
+        found = section.get("kind") if isinstance(section, dict) else section
+        raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine unsw_planetary has it")
+    if overrides:
+        section = override(section, overrides, source or where)
+        where = f"{source or where} (parameters, with {path})"
+    model = validate(PlanetaryModel, section, where, require_source=True)
+    stage = _single_stage(where, plate)
+    params = PlanetaryParams(
+        where=where,
+        model=model,
+        stage=stage,
+        bearings=_bearings(where, plate, stage) if model.planet_bearing.included else (),
+        first_mesh=_first_mesh(where, plate, stage) if model.first_stage.included else None,
+    )
+    _check(params)
+    return params
+
+
+def _single_stage(where: str, plate: Machine) -> PlanetaryStage:
+    if len(plate.planetary_stages) != 1:
+        found = f"{len(plate.planetary_stages)} planetary stages"
+        raise InputError(where, "kind", found, "one planetary stage in nameplate")
+    (stage,) = plate.planetary_stages
+    if stage.fixed_member != "ring":
+        expected = "a fixed ring: the model holds the ring by its support and drives carrier or sun"
+        raise InputError(where, "kind", f"fixed {stage.fixed_member}", expected)
+    if plate.reference_shaft != stage.carrier_shaft:
+        raise InputError(where, "kind", plate.reference_shaft, "the carrier's shaft as reference_shaft")
+    return stage
+
+
+def _bearings(where: str, plate: Machine, stage: PlanetaryStage) -> tuple[Bearing, ...]:
+    """Bearings of the planets in order, named planet_1_bearing and so on."""
+    found = []
+    for number in range(1, len(stage.planet_angles_rad) + 1):
+        name = f"planet_{number}_bearing"
+        if name not in {bearing.name for bearing in plate.bearings}:
+            raise InputError(where, "planet_bearing.included", 1, f"bearing {name} in nameplate")
+        bearing = plate.bearing(name)
+        if bearing.shaft != stage.planet_shaft or not bearing.outer_ring_rotates:
+            expected = (
+                f"shaft {stage.planet_shaft} and outer_ring_rotates: true, as the planet turns on its pin"
+            )
+            raise InputError(where, name, bearing.shaft, expected)
+        found.append(bearing)
+    return tuple(found)
+
+
+def _first_mesh(where: str, plate: Machine, stage: PlanetaryStage) -> GearMesh:
+    for mesh in plate.gear_meshes:
+        if mesh.driven_shaft == stage.carrier_shaft:
+            return mesh
+    raise InputError(where, "first_stage.included", 1, "a gear mesh in nameplate that drives the carrier")
+
+
+def _check(params: PlanetaryParams) -> None:
+    drive, where = params.model.drive, params.where
+    if drive.speed_hz > drive.speed_limit_hz:
+        raise InputError(where, "drive.speed", drive.speed_hz, f"<= {drive.speed_limit_hz} Hz")
+    if drive.load_nm > drive.load_limit_nm:
+        raise InputError(where, "drive.load", drive.load_nm, f"<= {drive.load_limit_nm} N m")
+    if params.first_mesh is not None and params.stage.input_member != "carrier":
+        expected = "0, as the first stage drives the carrier, which is not the input here"
+        raise InputError(where, "first_stage.included", 1, expected)
