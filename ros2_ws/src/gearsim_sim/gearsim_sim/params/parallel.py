@@ -17,7 +17,8 @@ from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine
 from gearsim_io.quantities import Si, validate
-from gearsim_sim.params.fields import Count, Fraction, Strict
+from gearsim_sim.params.bearing import RollingBearing
+from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
@@ -77,18 +78,6 @@ class GearErrors(Strict):
     harmonics: Count
 
 
-class BallBearing(Strict):
-    """What the nameplate does not tell of the ball bearings."""
-
-    rows: Annotated[Count, Si("", ge=1, le=2)]
-    row_stagger: Fraction
-    radial_clearance_m: Annotated[float, Si("m", ge=0), Field(alias="radial_clearance")]
-    inner_groove_conformity: Annotated[float, Si("", gt=0.5, le=1)]
-    youngs_modulus_pa: Annotated[float, Si("Pa", gt=0), Field(alias="youngs_modulus")]
-    poisson_ratio: Annotated[float, Si("", ge=0, lt=0.5)]
-    nominal_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="nominal_stiffness")]
-
-
 class Pedestal(Strict):
     """A bearing pedestal: a mass on springs, carrying a small mass that stands for a high resonance."""
 
@@ -139,13 +128,13 @@ class ParallelModel(Strict):
     seats: dict[str, Seat]
     mesh: MeshStiffness
     gear_errors: GearErrors
-    ball_bearing: BallBearing
+    ball_bearing: RollingBearing
     pedestal: Pedestal
     gravity_m_per_s2: Annotated[float, Si("m/s^2", ge=0), Field(alias="gravity")]
 
 
 class ParallelParams(Strict):
-    """Everything that the 34-DOF model needs: `model` section, nameplate, switches."""
+    """Everything that the models of 22 and 34 degrees of freedom need: `model` section, nameplate, switches."""
 
     where: str
     model: ParallelModel
@@ -153,6 +142,7 @@ class ParallelParams(Strict):
     bearings: tuple[Bearing, ...]
     input_shaft: str
     output_shaft: str
+    pedestals: bool = True  # False: the 22 internal degrees of freedom on rigid ground
     physics: Physics = Physics()
 
     @property
