@@ -10,6 +10,7 @@ Liang, Zuo and Pandey 2014). The wheel body below an external tooth yields after
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -32,19 +33,26 @@ _SAINSOT = np.array(
 # Root radius over bore radius that the polynomials were fitted to.
 _SAINSOT_BODIES = (1.4, 7.0)
 _SHEAR_FACTOR = 1.2  # rectangular section
-_root = lru_cache(maxsize=64)(tooth_root)
+root_of = lru_cache(maxsize=64)(tooth_root)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Contact points: height above the foot, distance from the middle line, angle of the force to the
+    line across the tooth (positive: into the body); shapes (contacts,).
+    """
+
+    height_m: Array
+    half_m: Array
+    angle_rad: Array
 
 
 def beam_compliance(
     outline: Outline,
-    lever_m: Array,
-    half_m: Array,
-    force_angle_rad: Array,
+    point: Point,
+    gear: SpurGear,
+    loaded_half_m: Array | None = None,
     other_half_m: Array | None = None,
-    *,
-    width_m: float,
-    youngs_modulus_pa: float,
-    poisson_ratio: float,
 ) -> Array:
     """Bending, shear and compression of a cantilever loaded on its flank [m/N], shape (3, contacts).
 
@@ -52,52 +60,43 @@ def beam_compliance(
     ----------
     outline : Outline
         Sections, shape (contacts, nodes).
-    lever_m, half_m, force_angle_rad : array, shape (contacts,)
-        Height of the contact point above the foot, its distance from the middle line, and the angle
-        between force and the line across the tooth.
-    other_half_m : array, shape (contacts, nodes), optional
-        Half the thickness on the loaded side where a crack has reduced it.
-    width_m, youngs_modulus_pa, poisson_ratio : float
-        Width along the axis, and material.
+    point : Point
+        Where and how the force acts, shapes (contacts,).
+    gear : SpurGear
+        Face width and material.
+    loaded_half_m, other_half_m : array, shape (contacts, nodes), optional
+        What a crack has left of half the thickness, on the loaded and on the other side.
     """
-    loaded = outline.half_m if other_half_m is None else other_half_m
-    thickness = outline.half_m + loaded
-    across, along = np.cos(force_angle_rad)[:, None], np.sin(force_angle_rad)[:, None]
+    loaded = outline.half_m if loaded_half_m is None else loaded_half_m
+    other = outline.half_m if other_half_m is None else other_half_m
+    across, along = np.cos(point.angle_rad)[:, None], np.sin(point.angle_rad)[:, None]
     # The neutral axis lies in the middle of what is left of the section.
-    offset = half_m[:, None] + (outline.half_m - loaded) / 2
-    moment = across * (lever_m[:, None] - outline.height_m) - along * offset
-    area = thickness * width_m
-    inertia = thickness**3 * width_m / 12
-    shear_modulus = youngs_modulus_pa / (2 * (1 + poisson_ratio))
+    offset = point.half_m[:, None] + (other - loaded) / 2
+    moment = across * (point.height_m[:, None] - outline.height_m) - along * offset
+    area = (loaded + other) * gear.face_width_m
+    inertia = (loaded + other) ** 3 * gear.face_width_m / 12
+    modulus = gear.youngs_modulus_pa
+    shear_modulus = modulus / (2 * (1 + gear.poisson_ratio))
     integrands = (
-        moment**2 / (youngs_modulus_pa * inertia),
+        moment**2 / (modulus * inertia),
         _SHEAR_FACTOR * across**2 / (shear_modulus * area),
-        along**2 / (youngs_modulus_pa * area),
+        along**2 / (modulus * area),
     )
     return np.array([np.sum(outline.weight_m * one, axis=1) for one in integrands])
 
 
-def contact_point(gear: SpurGear, root: Root, roll_rad: Array) -> tuple[Array, Array, Array]:
-    """Height above the foot, distance from the middle line, angle of the force, at these roll angles."""
-    x, half = gear.flank(roll_rad)
-    return gear.side * (x - root.foot_m), half, gear.force_angle_rad(roll_rad)
+def contact_point(gear: SpurGear, root: Root, roll_rad: Array) -> Point:
+    """The contact at these roll angles."""
+    roll = np.atleast_1d(np.asarray(roll_rad, dtype=np.float64))
+    x, half = gear.flank(roll)
+    return Point(gear.side * (x - root.foot_m), half, gear.force_angle_rad(roll))
 
 
 def tooth_compliance(gear: SpurGear, roll_rad: Array) -> Array:
     """Bending + shear + compression of a sound tooth [m/N] for contact at these roll angles."""
-    roll = np.atleast_1d(np.asarray(roll_rad, dtype=np.float64))
-    root = _root(gear)
-    lever, half, angle = contact_point(gear, root, roll)
-    outline = tooth_outline(gear, root, roll)
-    parts = beam_compliance(
-        outline,
-        lever,
-        half,
-        angle,
-        width_m=gear.face_width_m,
-        youngs_modulus_pa=gear.youngs_modulus_pa,
-        poisson_ratio=gear.poisson_ratio,
-    )
+    root = root_of(gear)
+    outline = tooth_outline(gear, root, roll_rad)
+    parts = beam_compliance(outline, contact_point(gear, root, roll_rad), gear)
     return np.asarray(parts.sum(axis=0))
 
 
@@ -110,10 +109,11 @@ def foundation_compliance(gear: SpurGear, roll_rad: Array) -> Array:
         If the body of an external gear is outside what Sainsot's polynomials cover (root radius over
         bore radius 1.4 to 7).
     """
-    root = _root(gear)
-    lever, half, angle = contact_point(gear, root, np.atleast_1d(np.asarray(roll_rad, dtype=np.float64)))
+    root = root_of(gear)
+    point = contact_point(gear, root, roll_rad)
+    angle = point.angle_rad
     # u: from the foot to where the line of the force crosses the middle line; s: thickness of the foot.
-    u_over_s = (lever - half * np.tan(angle)) / (2 * root.foot_half_m)
+    u_over_s = (point.height_m - point.half_m * np.tan(angle)) / (2 * root.foot_half_m)
     scale = np.cos(angle) ** 2 / (gear.youngs_modulus_pa * gear.face_width_m)
     if gear.internal:
         nu = gear.poisson_ratio

@@ -120,7 +120,7 @@ class SpurGear:
         return math.sqrt((radius_m / self.base_radius_m) ** 2 - 1)
 
     def flank(self, roll_rad: Array) -> tuple[Array, Array]:
-        """Points of the flank [m]: distance from the axis along the tooth's middle line, and off that line."""
+        """Points of the flank [m]: distance from the axis along the tooth's middle line, and off it."""
         angle = self.base_half_angle_rad - self.side * (roll_rad - np.arctan(roll_rad))
         radius = self.base_radius_m * np.sqrt(1 + roll_rad**2)
         return radius * np.cos(angle), radius * np.sin(angle)

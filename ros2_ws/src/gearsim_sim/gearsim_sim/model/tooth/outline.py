@@ -65,6 +65,19 @@ class Root:
         """Half the angle of the tooth at its foot, seen from the axis."""
         return math.atan2(self.foot_half_m, self.foot_m)
 
+    def weakest(self, *, internal: bool) -> tuple[float, float]:
+        """Height above the foot and half thickness where a crack begins [m].
+
+        There the fillet's tangent stands at 30 deg to the middle line (ring gear: 60 deg), the critical
+        section of ISO 6336-3; without a fillet it is the lowest point of the flank.
+        """
+        side = -1 if internal else 1
+        if self.fillet_m == 0:
+            return side * (self.flank_m - self.foot_m), self.flank_half_m
+        tangent = math.radians(60 if internal else 30)
+        x = self.centre_m - side * self.fillet_m * math.sin(tangent)
+        return side * (x - self.foot_m), self.centre_half_m - self.fillet_m * math.cos(tangent)
+
 
 def tooth_root(gear: SpurGear) -> Root:
     """Where the fillet touches root circle and flank.

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GearPair:
-    """A pinion and a wheel without backlash, as far apart as their profile shifts demand.
+    """A pinion and a wheel, `spread_m` further apart than where they would mesh without backlash.
 
     Raises
     ------
@@ -33,6 +33,7 @@ class GearPair:
 
     pinion: SpurGear
     wheel: SpurGear
+    spread_m: float = 0.0
 
     def __post_init__(self) -> None:
         _check_alike(self)
@@ -47,7 +48,16 @@ class GearPair:
 
     @property
     def pressure_angle_rad(self) -> float:
-        """Working pressure angle: inv(a_w) = inv(a) + 2 tan(a) (x2 +- x1) / (z2 +- z1)."""
+        """Working pressure angle."""
+        return math.acos(self._bases_m / self.centre_distance_m)
+
+    @property
+    def _bases_m(self) -> float:
+        """Base radii, as they lie on the line between the axes."""
+        return self.wheel.base_radius_m + self.wheel.side * self.pinion.base_radius_m
+
+    def _tight_angle_rad(self) -> float:
+        """Pressure angle without backlash: inv(a_w) = inv(a) + 2 tan(a) (x2 +- x1) / (z2 +- z1)."""
         alpha, sign = self.pinion.pressure_angle_rad, self.wheel.side
         shift = self.pinion.profile_shift + sign * self.wheel.profile_shift
         teeth = self.pinion.teeth + sign * self.wheel.teeth
@@ -61,8 +71,16 @@ class GearPair:
     @property
     def centre_distance_m(self) -> float:
         """Distance of the axes."""
-        base = self.wheel.base_radius_m + self.wheel.side * self.pinion.base_radius_m
-        return base / math.cos(self.pressure_angle_rad)
+        return self._bases_m / math.cos(self._tight_angle_rad()) + self.spread_m
+
+    @property
+    def backlash_m(self) -> float:
+        """Play along the line of action that the spread gives: the teeth's thickness does the rest.
+
+        The involutes of both flanks part by the change of inv(a_w), on base circles that roll together.
+        """
+        opened = involute(self.pressure_angle_rad) - involute(self._tight_angle_rad())
+        return 2 * self._bases_m * opened
 
     @property
     def contact_ratio(self) -> float:

@@ -58,7 +58,7 @@ def stiffness_series(pair: GearPair, harmonics: int) -> PeriodicSeries:
     Lanczos factors let it end without overshoot. The mean is exact: the mean stiffness of a pair over its
     path, times the contact ratio.
     """
-    nodes = window_nodes(pair.contact_ratio)
+    nodes = window_nodes(pair.contact_ratio, harmonics)
     return window_series(nodes, pair_stiffness(pair, nodes.phase), 1, 0, harmonics)
 
 

@@ -13,8 +13,10 @@ from gearsim_sim.model.periodic import PeriodicSeries
 
 Array = NDArray[np.float64]
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(16)
-# Length of a quadrature panel in pitches: 16 nodes follow orders up to 40 per pitch to rounding.
-_PANEL = 0.125
+# Periods of the highest order in a quadrature panel: 16 nodes integrate four to
+# 1e-6 of the integrand (Gauss-Legendre: once past pi nodes per period, faster than any power).
+_PERIODS = 4.0
+_LONGEST_PANEL = 0.125
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +27,17 @@ class Nodes:
     weight: Array
 
 
-def window_nodes(length: float, breaks: Sequence[float] = ()) -> Nodes:
-    """Nodes over [-length / 2, length / 2]; panels end at `breaks`, where an integrand has kinks or jumps."""
+def window_nodes(length: float, harmonics: int, breaks: Sequence[float] = ()) -> Nodes:
+    """Nodes over [-length / 2, length / 2] for integrals up to the order `harmonics` per pitch.
+
+    Panels end at `breaks`, where an integrand has kinks or jumps.
+    """
+    longest = min(_LONGEST_PANEL, _PERIODS / harmonics)
     inner = [point for point in breaks if abs(point) < length / 2]
     ends = np.unique(np.array([-length / 2, *inner, length / 2]))
     edges = np.concatenate(
         [
-            np.linspace(start, stop, int(np.ceil((stop - start) / _PANEL)) + 1)[:-1]
+            np.linspace(start, stop, int(np.ceil((stop - start) / longest)) + 1)[:-1]
             for start, stop in pairwise(ends)
         ]
     )
