@@ -1,0 +1,67 @@
+"""What a machine's structure has beside the model's masses: added resonances and transfer paths.
+
+Both are entered into the linear system for good, as the section `structure` of a scenario asks. A
+resonance is a mass on a spring and a damper at a measuring site (as the resonator of a pedestal is); a
+path is a mass between two sites, each joined to it by a spring and a damper. The fault kinds `resonance`
+and `transfer_path` do the same with a severity (`side_oscillator`), and must agree with this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_sim.model.assembly import LinearSystem, Vector
+from gearsim_sim.model.side_oscillator import SideOscillator
+
+Array = NDArray[np.float64]
+
+
+def with_oscillators(system: LinearSystem, added: Mapping[str, SideOscillator]) -> LinearSystem:
+    """The system with further masses; each key names the degree of freedom of one."""
+    size, count = len(system.dof_names), len(added)
+    mass, damping, stiffness = (np.zeros((size + count, size + count)) for _ in range(3))
+    for matrix, own in ((mass, system.mass), (damping, system.damping), (stiffness, system.stiffness)):
+        matrix[:size, :size] = own
+    for number, one in enumerate(added.values()):
+        mass[size + number, size + number] = one.mass_kg
+        share = one.mass_kg / len(one.directions)
+        for direction in one.directions:
+            vector = np.zeros(size + count)
+            vector[:size] = -system.direction(direction)
+            vector[size + number] = 1.0
+            stiffness += share * one.omega**2 * np.outer(vector, vector)
+            damping += share * 2 * one.damping_ratio * one.omega * np.outer(vector, vector)
+    return replace(
+        system,
+        dof_names=(*system.dof_names, *added),
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        interfaces=np.vstack([system.interfaces, np.zeros((count, system.interfaces.shape[1]))]),
+        inputs=np.vstack([system.inputs, np.zeros((count, system.inputs.shape[1]))]),
+    )
+
+
+def weighted(system: LinearSystem, gravity_input: int, weights: Mapping[str, float]) -> LinearSystem:
+    """The system with the weight of further masses, per unit of gravity: degree of freedom to -mass."""
+    inputs = system.inputs.copy()
+    for name, value in weights.items():
+        inputs[system.dof(name), gravity_input] += value
+    return replace(system, inputs=inputs)
+
+
+def joined_parts(
+    parts: Sequence[tuple[str, ...]], added: Mapping[str, Sequence[Vector]]
+) -> tuple[tuple[str, ...], ...]:
+    """The independent parts when further degrees of freedom join some: each key hangs on its directions."""
+    groups = [list(part) for part in parts]
+    for name, directions in added.items():
+        touched = {dof for direction in directions for dof in direction}
+        together = [group for group in groups if touched & set(group)]
+        apart = [group for group in groups if not touched & set(group)]
+        groups = [*apart, [dof for group in together for dof in group] + [name]]
+    return tuple(tuple(group) for group in groups)
