@@ -63,6 +63,19 @@ def test_a_crack_halves_the_section():
     assert left[0, -1] == pytest.approx(outline.half_m[0, -1], rel=0.02)
 
 
+def test_where_a_crack_ends():
+    """Sections below its tip are whole: straight across at the height where it begins, else further down."""
+    root = cracks.root_of(RIG)
+    outline = cracks.tooth_outline(RIG, root, np.array([RIG.roll_rad(RIG.tip_radius_m)]))
+    start_height, _ = root.weakest(internal=False)
+    for angle, drop in ((math.pi / 2, 0.0), (math.pi / 3, 0.5e-3)):
+        left = cracks._left_of_section(RIG, root, outline, 1e-3, angle)
+        cut = outline.height_m[left < outline.half_m - 1e-12].min()
+        below = outline.height_m[outline.height_m < start_height - drop].max()
+        assert cut > start_height - drop >= below
+        assert cut - below < 0.1e-3
+
+
 def test_crack_along_a_part_of_the_face():
     """Springs side by side: half the width loses less than half of it all; running out costs less still."""
     through = cracked_pair_loss(PAIR, Crack(3e-3), PHASE, of_wheel=False, opens=True)
