@@ -11,15 +11,14 @@ import pytest
 from oracles.plain_lpm34 import Plain
 from scipy.integrate import solve_ivp
 
-from gearsim_sim.engine import DEFAULT_SITES
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.model.faults import REGISTRY
-from gearsim_sim.model.lpm34 import Moment, make_gearbox
+from gearsim_sim.model.plant import Moment
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.params import load_parallel_params
-from gearsim_sim.params.parallel import BEARINGS
-from gearsim_sim.schedule import ActiveFault, Ramp, Schedule
+from gearsim_sim.schedule import ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Stepper
 
 RATE_HZ, DURATION_S, TURNS, SPEED_HZ, LOAD_NM = 65536.0, 0.025, 0.5, 10.0, 50.0
@@ -27,25 +26,23 @@ RATE_HZ, DURATION_S, TURNS, SPEED_HZ, LOAD_NM = 65536.0, 0.025, 0.5, 10.0, 50.0
 
 @pytest.fixture(scope="module")
 def gearbox():
-    return make_gearbox(load_parallel_params(), seed=3)
+    return make_plant(load_parallel_params(), seed=3)
 
 
-def spall_of(gearbox, kind):
+def fault_of(gearbox, kind):
     """A spall at bearing 3 that a loaded ball crosses soon after the start."""
     position = -np.pi / 2
     if kind == "inner_race_spall":  # in the middle of the load zone, in the middle of the run
         position -= 2 * np.pi * (TURNS + SPEED_HZ * DURATION_S / 2)
         position = float(np.angle(np.exp(1j * position)))
-    return REGISTRY[kind].build(
-        FaultSpec(kind, "bearing_3", {"position_rad": position}), BEARINGS, gearbox.bearings
-    )
+    return REGISTRY[kind].build(FaultSpec(kind, "bearing_3", {"position_rad": position}), gearbox)
 
 
-def engine_accelerations(gearbox, spall, oversampling):
+def engine_accelerations(gearbox, fault, oversampling):
     schedule = Schedule(gearbox, 1 / (RATE_HZ * oversampling), 0, TURNS, SPEED_HZ, LOAD_NM)
-    if spall is not None:
-        schedule.faults["spall"] = ActiveFault(spall, Ramp(1.0, 1.0), 0, 0.0)
-    stepper = Stepper(gearbox, schedule, DEFAULT_SITES, oversampling)
+    if fault is not None:
+        schedule.faults["spall"] = ActiveFault(fault, Severity(1.0, 1.0, 0, 0.0))
+    stepper = Stepper(gearbox, schedule, gearbox.sites, oversampling)
     count = int(DURATION_S * RATE_HZ) * oversampling
     accel = np.zeros((8, count))
     stepper.advance(count, accel, 0)
@@ -56,9 +53,9 @@ def plain_model(gearbox, spall):
     def series(one, per_turn=1):
         return one.orders * per_turn, one.cosine, one.sine
 
-    mesh = gearbox.mesh
-    pinion, gear = series(mesh.pinion_error), series(mesh.gear_error)
-    constant = mesh.pinion_error.mean + mesh.gear_error.mean
+    mesh = gearbox.meshes[0]
+    pinion, gear = (series(one.series) for one in mesh.errors)
+    constant = sum(one.series.mean for one in mesh.errors)
     errors = tuple(
         np.concatenate([a, b, [extra]]) for a, b, extra in zip(pinion, gear, (0, constant, 0), strict=True)
     )
@@ -71,7 +68,7 @@ def plain_model(gearbox, spall):
             "width": 0.8e-3,
             "at": spall.position_rad,
         }
-    bearing = gearbox.bearings[0]
+    bearing = gearbox.bearings[0].law
     return Plain(
         factor=bearing.load_factor,
         clearance=bearing.clearance_m,
@@ -87,7 +84,7 @@ def plain_model(gearbox, spall):
 def reference(gearbox, spall, times):
     """Accelerations of the sites, and the least compression of a ball of bearing 3 over the spall."""
     plain = plain_model(gearbox, spall)
-    moment = Moment(TURNS, SPEED_HZ, () if spall is None else (spall,))
+    moment = Moment(TURNS, SPEED_HZ, () if spall is None else ((spall, 1.0),))
     start = static_equilibrium(gearbox, complex_modes(gearbox.system), moment, gearbox.known_inputs(LOAD_NM))
     solution = solve_ivp(
         plain,
@@ -100,7 +97,7 @@ def reference(gearbox, spall, times):
         dense_output=True,
     )
     states = solution.sol(times)
-    rows = [gearbox.system.dof(name) for vector in DEFAULT_SITES.values() for name in vector]
+    rows = [gearbox.system.dof(name) for vector in gearbox.sites.values() for name in vector]
     accel = np.array(
         [plain.acceleration(t, y[:34], y[34:])[rows] for t, y in zip(times, states.T, strict=True)]
     )
@@ -111,21 +108,21 @@ def lost_contact(gearbox, spall, times, states):
     """Instants at which a ball inside the spall is loose although it would carry on a whole race."""
     if spall is None:
         return 0
-    bearing, found = gearbox.bearings[spall.bearing], 0
+    seat, found = gearbox.bearings[spall.bearing], 0
     for t, state in zip(times, states.T, strict=True):
-        moment = Moment(TURNS + SPEED_HZ * t, SPEED_HZ, (spall,))
-        q = (gearbox.system.interfaces.T @ state[:34])[2 * spall.bearing : 2 * spall.bearing + 2]
-        angle = gearbox.cage_angle_rad(spall.bearing, moment.turns)
-        missing = gearbox.missing(spall.bearing, moment)
-        whole, real = bearing.compressions(q, angle), bearing.compressions(q, angle, missing)
+        phases = gearbox.phases(TURNS + SPEED_HZ * t)
+        q = (gearbox.system.interfaces.T @ state[:34])[[seat.x, seat.y]]
+        angle, missing = seat.cage_angle_rad(phases), seat.missing(phases, ((spall, 1.0),))
+        whole, real = seat.law.compressions(q, angle), seat.law.compressions(q, angle, missing)
         found += int(np.any((missing > 0) & (whole > 0) & (real < 0)))
     return found
 
 
 @pytest.mark.parametrize("kind", [None, "outer_race_spall", "inner_race_spall"])
 def test_acceleration_against_dop853(gearbox, kind):
-    spall = None if kind is None else spall_of(gearbox, kind)
-    accel = engine_accelerations(gearbox, spall, 4)
+    fault = None if kind is None else fault_of(gearbox, kind)
+    spall = None if fault is None else fault.contributions[0]
+    accel = engine_accelerations(gearbox, fault, 4)
     every = 3
     times = np.arange(1, accel.shape[1] + 1)[::every] / (4 * RATE_HZ)
     truth, loose = reference(gearbox, spall, times)
@@ -137,10 +134,10 @@ def test_acceleration_against_dop853(gearbox, kind):
 
 def test_more_oversampling_means_less_error(gearbox):
     """Against 16x: errors of 2x, 4x and 8x shrink at least fourfold each, although the spall has kinks."""
-    spall = spall_of(gearbox, "outer_race_spall")
-    finest = engine_accelerations(gearbox, spall, 16)[:, 15::16]
+    fault = fault_of(gearbox, "outer_race_spall")
+    finest = engine_accelerations(gearbox, fault, 16)[:, 15::16]
     errors = []
     for oversampling in (2, 4, 8):
-        accel = engine_accelerations(gearbox, spall, oversampling)[:, oversampling - 1 :: oversampling]
+        accel = engine_accelerations(gearbox, fault, oversampling)[:, oversampling - 1 :: oversampling]
         errors.append(float(np.sqrt(np.mean((accel - finest) ** 2))))
     assert errors[0] > 3 * errors[1] > 9 * errors[2]

@@ -10,13 +10,14 @@ from gearsim_sim.bench import (
     rest_state,
     rk45_real_time_factor,
 )
-from gearsim_sim.model.lpm34 import Moment, make_gearbox
+from gearsim_sim.model.plant import Moment
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.params import load_parallel_params
 
 
 @pytest.mark.parametrize("kind", [PlainGearbox, VectorisedGearbox])
 def test_numpy_right_hand_sides_equal_the_model(kind):
-    gearbox = make_gearbox(load_parallel_params(), 1)
+    gearbox = make_plant(load_parallel_params(), 1)
     state = rest_state(gearbox) + np.random.default_rng(1).normal(size=68) * 1e-6
     found = kind(gearbox)(0.013, state)
     moment = Moment(0.5 + 10 * 0.013, 10.0)

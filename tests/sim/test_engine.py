@@ -5,9 +5,10 @@ import pytest
 from scipy.signal import butter, hilbert, sosfiltfilt
 
 from gearsim_io.errors import InputError
-from gearsim_sim.engine import DEFAULT_SITES, PROBE_NAMES, Engine
+from gearsim_sim.engine import Engine, probe_names
 from gearsim_sim.events import Clear, FaultSpec, Inject, SetOperatingPoint
-from gearsim_sim.model.lpm34 import Moment, make_gearbox
+from gearsim_sim.model.faults import fault_kind
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.params import load_parallel_params
 
 RATE_HZ = 65536.0
@@ -55,25 +56,22 @@ def test_two_engines_do_not_disturb_each_other(params):
 
 
 def test_compiled_forces_equal_the_readable_model(params):
-    """Bearing and mesh forces of the loop against `Gearbox`, at the displacements of the loop."""
+    """Bearing forces of the loop against `Plant`, at the displacements of the loop."""
     fault = FaultSpec("inner_race_spall", "bearing_2", {"row": 2})
     faults = [SPALL, fault]
-    engine = Engine(params, 3, RATE_HZ, 4, faults, probes=PROBE_NAMES)
-    output = engine.advance(3000)
-    gearbox = make_gearbox(params, 3)
-    from gearsim_sim.model.faults import REGISTRY
-    from gearsim_sim.params.parallel import BEARINGS
-
-    spalls = tuple(REGISTRY[spec.kind].build(spec, BEARINGS, gearbox.bearings) for spec in faults)
+    plant = make_plant(params, 3)
+    output = Engine(params, 3, RATE_HZ, 4, faults, probes=probe_names(plant)).advance(3000)
+    spalls = [fault_kind(spec.kind).build(spec, plant).contributions[0] for spec in faults]
     crossed = 0
     for i in range(0, 3000, 13):
-        moment = Moment(0.5 + 10.0 * i / RATE_HZ, 10.0, spalls)
-        q = np.array([output.probes[f"{name}.displacement_m"][i] for name in gearbox.system.interface_names])
-        for bearing in range(4):
+        phases = plant.phases(0.5 + 10.0 * i / RATE_HZ)
+        q = np.array([output.probes[f"{name}.displacement_m"][i] for name in plant.system.interface_names])
+        for bearing, seat in enumerate(plant.bearings):
             found = [output.probes[f"b{bearing + 1}_{axis}.force_n"][i] for axis in "xy"]
+            own = tuple((spall, 1.0) for spall in spalls if spall.bearing == bearing)
             # The loop takes its forces at the predicted motion, which differs in the tenth digit.
-            assert found == pytest.approx(gearbox.bearing_force(bearing, q, moment), abs=1e-3)
-            crossed += np.any(gearbox.missing(bearing, moment) > 5e-6)
+            assert found == pytest.approx(seat.force(q[[seat.x, seat.y]], phases, own), abs=1e-3)
+            crossed += np.any(seat.missing(phases, own) > 5e-6)
     assert crossed > 10
 
 
@@ -256,7 +254,12 @@ def test_ball_pass_frequencies_emerge_in_the_envelope(params, kind, expected_hz)
 
 def test_sites_are_linear_combinations(params):
     diagonal = {"x_p1": np.sqrt(0.5), "y_p1": np.sqrt(0.5)}
-    sites = {**DEFAULT_SITES, "tilted": diagonal, "resonator": {"y_r1": 1.0}, "spin": {"theta_pin": 1.0}}
+    sites = {
+        **make_plant(params, 1).sites,
+        "tilted": diagonal,
+        "resonator": {"y_r1": 1.0},
+        "spin": {"theta_pin": 1.0},
+    }
     output = Engine(params, 1, RATE_HZ, sites=sites).advance(500)
     rows = dict(zip(output.site_names, output.accel, strict=True))
     assert rows["tilted"] == pytest.approx(np.sqrt(0.5) * (rows["b1_x"] + rows["b1_y"]), abs=1e-9)
@@ -373,12 +376,12 @@ def test_long_runs_keep_their_digits(params):
     """After ten days of turning, an anchor's fraction is as good as at the start."""
     from gearsim_sim.schedule import Schedule
 
-    gearbox = make_gearbox(params, 1)
-    schedule = Schedule(gearbox, 1 / 262144, 0, 0.5, 10.0, 50.0)
+    plant = make_plant(params, 1)
+    schedule = Schedule(plant, 1 / 262144, 0, 0.5, 10.0, 50.0)
     for number in range(1, 40001):
         schedule.rebase(number * 65536)
     exact = 0.5 + 10.0 * 40000 * 65536 / 262144
     assert schedule.anchor_turns[0] + schedule.anchor_phases[0] == pytest.approx(exact, abs=1e-10)
-    cage = gearbox.bearings[2].cage_ratio
+    cage = plant.bearings[2].law.cage_ratio
     passed = schedule.anchor_turns[4] + schedule.anchor_phases[4]
     assert passed == pytest.approx(cage * exact, rel=1e-14)

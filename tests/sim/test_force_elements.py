@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from gearsim_sim.model.lpm34 import Moment, make_gearbox
-from gearsim_sim.model.statics import potential_energy, static_equilibrium
+from gearsim_sim.model.plant import Moment
+from gearsim_sim.model.plants import make_plant
+from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.params import load_parallel_params
 
 
 @pytest.fixture(scope="module")
 def gearbox():
-    return make_gearbox(load_parallel_params(), seed=3)
+    return make_plant(load_parallel_params(), seed=3)
 
 
 def gradient(energy, x, step):
@@ -31,7 +32,7 @@ def displacement(rng):
 @pytest.mark.parametrize("trial", range(6))
 def test_bearing_force_is_the_gradient_of_its_energy(gearbox, trial):
     rng = np.random.default_rng(trial)
-    bearing = gearbox.bearings[trial % 4]
+    bearing = gearbox.bearings[trial % 4].law
     q, angle = displacement(rng), rng.uniform(0, 2 * np.pi)
     missing = rng.uniform(0, 5e-6, bearing.ball_count)
     found = gradient(lambda p: bearing.energy(p, angle, missing), q, 1e-8)
@@ -43,7 +44,7 @@ def test_bearing_force_is_the_gradient_of_its_energy(gearbox, trial):
 @pytest.mark.parametrize("trial", range(4))
 def test_bearing_stiffness_is_the_gradient_of_its_force(gearbox, trial):
     rng = np.random.default_rng(trial)
-    bearing = gearbox.bearings[0]
+    bearing = gearbox.bearings[0].law
     q, angle = displacement(rng), rng.uniform(0, 2 * np.pi)
     stiffness = bearing.stiffness(q, angle)
     assert stiffness == pytest.approx(stiffness.T, rel=1e-12)
@@ -53,10 +54,11 @@ def test_bearing_stiffness_is_the_gradient_of_its_force(gearbox, trial):
 
 
 def test_mesh_force_is_the_gradient_of_its_energy(gearbox):
-    mesh = gearbox.mesh
+    mesh, still = gearbox.meshes[0], np.zeros(6)
     for turns in (0.1, 0.734, 2.2):
-        found = gradient(lambda d, t=turns: mesh.energy(float(d[0]), t), np.array([5e-6]), 1e-9)
-        assert found[0] == pytest.approx(mesh.force(5e-6, 0.0, turns), rel=1e-6)
+        phases = gearbox.phases(turns)
+        found = gradient(lambda d, p=phases: mesh.energy(float(d[0]), p), np.array([5e-6]), 1e-9)
+        assert found[0] == pytest.approx(mesh.force(5e-6, 0.0, phases, still), rel=1e-6)
 
 
 @pytest.mark.parametrize("trial", range(4))
@@ -67,7 +69,7 @@ def test_power_balance_of_the_whole(gearbox, trial):
     x, v = rng.normal(size=34) * 1e-5, rng.normal(size=34) * 1e-2
     u = gearbox.known_inputs(50.0)
     acceleration = gearbox.acceleration(x, v, moment, u)
-    potential = gradient(lambda e: potential_energy(gearbox, moment, x + e[0] * v), np.zeros(1), 1e-6)[0]
+    potential = gradient(lambda e: gearbox.potential_energy(x + e[0] * v, moment), np.zeros(1), 1e-6)[0]
     stored = v @ system.mass @ acceleration + potential
     dissipated = v @ system.damping @ v
     throughput = np.abs(v) @ np.abs(system.mass @ acceleration)
@@ -93,7 +95,7 @@ def test_action_equals_reaction(gearbox):
 
 
 def test_balls_only_push_and_touch_softly(gearbox):
-    bearing = gearbox.bearings[0]
+    bearing = gearbox.bearings[0].law
     gaps = np.linspace(-5e-6, 5e-6, 2001)
     force = bearing.ball_forces(gaps)
     assert np.all(force[gaps <= 0] == 0)
@@ -109,15 +111,15 @@ def test_load_zone_lies_where_the_load_presses(gearbox):
 
     moment, u = Moment(0.5, 10.0), gearbox.known_inputs(50.0)
     x = static_equilibrium(gearbox, complex_modes(gearbox.system), moment, u)
-    forces = np.array([gearbox.bearing_force(i, gearbox.system.interfaces.T @ x, moment) for i in range(4)])
+    q, phases = gearbox.system.interfaces.T @ x, gearbox.phases(moment.turns)
+    forces = np.array([seat.force(q[[seat.x, seat.y]], phases) for seat in gearbox.bearings])
     tooth_force = 50.0 / 0.0463
     weight = 9.80665 * (1.2638 + 2.1208 + 0.5134)
     assert forces[:2, 1].sum() == pytest.approx(tooth_force - weight, rel=1e-9)
     assert forces[2:, 1].sum() == pytest.approx(-tooth_force - weight, rel=1e-9)
-    for i, bearing in enumerate(gearbox.bearings):
-        q = (gearbox.system.interfaces.T @ x)[2 * i : 2 * i + 2]
-        angle = gearbox.cage_angle_rad(i, moment.turns)
-        loaded = bearing.compressions(q, angle) > 0
+    for i, seat in enumerate(gearbox.bearings):
+        bearing, angle = seat.law, seat.cage_angle_rad(phases)
+        loaded = bearing.compressions(q[[seat.x, seat.y]], angle) > 0
         away = np.angle(np.exp(1j * (bearing.azimuths_rad + angle - bearing.load_direction_rad)))
         assert 5 <= loaded.sum() < 13
         assert np.abs(away[loaded]).max() < np.abs(away[~loaded]).min()

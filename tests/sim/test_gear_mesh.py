@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gearsim_sim.integrate.pieces import (
+    DEGREE,
     circle_table,
     cosine_sine,
-    plain_fading_slope,
+    plain_polynomial,
     plain_ramp,
     table_value,
 )
@@ -16,6 +17,7 @@ from gearsim_sim.model.gear_errors import gear_error, pitch_series
 from gearsim_sim.model.gear_mesh import stiffness_series
 from gearsim_sim.model.periodic import merged, sinusoid
 from gearsim_sim.params import load_parallel_params
+from gearsim_sim.schedule import ramp, steady
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +111,7 @@ def test_tables_follow_their_series(params):
     series = gear_error(params.model.gear_errors, params.physics, 32, 0.0, 3, 0)
     table = series.table()
     turns = np.random.default_rng(0).uniform(0, 3, 400)
-    found = np.array([table_value(t, table) for t in turns])
+    found = np.array([table_value(t, table, 0, table.size // 2 - 1) for t in turns])
     assert found[:, 0] == pytest.approx(series.value(turns), abs=1e-13)
     slope = series.slope(turns)
     assert found[:, 1] == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
@@ -123,12 +125,11 @@ def test_cosine_and_sine_to_rounding():
     assert found[:, 1] == pytest.approx(np.sin(2 * np.pi * turns), abs=1e-15)
 
 
-@pytest.mark.parametrize("shape", [plain_ramp, plain_fading_slope])
-def test_ramps_are_smooth_and_consistent(shape):
+def test_ramps_are_smooth_and_consistent():
     """Slope and integral belong to the value; nothing jumps at either end, curvature included."""
     steps = 1000.0
     at = np.linspace(-100, 1300, 28001)
-    value, slope, integral = np.array([shape(s, steps) for s in at]).T
+    value, slope, integral = np.array([plain_ramp(s, steps) for s in at]).T
     inside = (at > 0) & (at < 1200)
     assert np.gradient(value, at)[inside] == pytest.approx(
         slope[inside], abs=2e-6 * np.abs(slope).max() + 1e-9
@@ -136,5 +137,30 @@ def test_ramps_are_smooth_and_consistent(shape):
     assert np.gradient(integral, at)[inside] == pytest.approx(value[inside], abs=1e-5 * np.abs(value).max())
     curvature = np.gradient(slope, at)
     assert np.abs(np.diff(curvature[at > 0.2])).max() < 2e-3 * np.abs(curvature).max()
-    assert (value[-1], slope[-1]) == ((1.0, 0.0) if shape is plain_ramp else (0.0, 0.0))
-    assert shape(1e-9, steps)[1] == pytest.approx(0.0 if shape is plain_ramp else 1.0, abs=1e-9)
+    assert (value[-1], slope[-1]) == (1.0, 0.0)
+    assert plain_ramp(1e-9, steps)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_polynomials_and_their_derivatives():
+    coefficients = np.random.default_rng(1).normal(size=DEGREE + 1)
+    reference = np.polynomial.Polynomial(coefficients)
+    for u in (0.0, 0.3, 1.0, -2.5):
+        expected = [reference(u), reference.deriv()(u), reference.deriv(2)(u)]
+        assert plain_polynomial(u, coefficients) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_ramp_of_speed_takes_over_what_it_finds():
+    """Angle, speed and acceleration run on at both ends, and the angle is the integral of the speed."""
+    step_s, steps = 1 / 262144, 50_000
+    first = ramp(steady(0, step_s, 10.0, 50.0), 0, 12.0, 50.0, 100_000)
+    second = ramp(first, 40_000, 8.0, 70.0, steps)
+    for name in ("speed_hz", "acceleration_hz_per_s", "load_nm"):
+        assert getattr(second, name)(40_000) == pytest.approx(getattr(first, name)(40_000), rel=1e-12)
+    end = 40_000 + steps
+    assert (second.end_step, second.speed_hz(end), second.load_nm(end)) == pytest.approx((end, 8.0, 70.0))
+    assert second.acceleration_hz_per_s(end) == pytest.approx(0.0, abs=1e-6)
+    at = np.arange(40_000, end + 1)
+    speed = np.array([second.speed_hz(step) for step in at])
+    assert second.turns_at(end) == pytest.approx(np.trapezoid(speed, dx=step_s), rel=1e-9)
+    slope = np.gradient(speed, step_s)[1:-1]
+    assert slope == pytest.approx([second.acceleration_hz_per_s(step) for step in at[1:-1]], abs=1e-3)

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from gearsim_sim.model.hertz import ball_load_factor, point_contact_factor
-from gearsim_sim.model.lpm34 import make_gearbox
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.params import load_parallel_params
 
 STEEL = 206e9 / (2 * (1 - 0.3**2))
@@ -57,7 +57,7 @@ def test_koyo_1205_load_factor():
 
 def test_linear_stiffness_of_the_thesis_at_working_load():
     """Two rows of these balls are as stiff as the tabulated 1.5e8 N/m within the range of loads."""
-    bearing = make_gearbox(load_parallel_params(), 1).bearings[0]
+    bearing = make_plant(load_parallel_params(), 1).bearings[0].law
 
     def stiffness(load):
         y = brentq(lambda y: bearing.force(np.array([0.0, y]), 0.0)[1] - load, 0, 1e-3)
@@ -70,7 +70,7 @@ def test_linear_stiffness_of_the_thesis_at_working_load():
 
 def test_hertz_reading_of_the_tabulated_value_is_impossible():
     """As a factor in N/m^1.5, 1.5e8 would let the shaft sink deeper than the spall is (errata)."""
-    bearing = make_gearbox(load_parallel_params().with_physics(clearance=False), 1).bearings[0]
+    bearing = make_plant(load_parallel_params().with_physics(clearance=False), 1).bearings[0].law
     load = 50 / 0.0463 / 2
     y = brentq(lambda y: bearing.force(np.array([0.0, y]), 0.0)[1] - load, 0, 1e-3)
     assert y * (bearing.load_factor / 1.5e8) ** (2 / 3) > 60e-6

@@ -74,7 +74,7 @@ def error_of_the_scheme(steps, duration=0.02):
     history = np.array([interface_forces(system, state) for state in past])
     left = prop.left.reshape(ni, 2 * nm)
     s[6 * nm : 12 * nm] = (history @ left).ravel()
-    s[12 * nm + 2 * nq : 12 * nm + 2 * nq + 3 * ni] = history.ravel()
+    s[12 * nm + 4 * ni : 12 * nm + 4 * ni + 3 * ni] = history.ravel()
     forward, state = expm(matrix * step), start
     worst, largest = 0.0, 0.0
     for _ in range(steps):
@@ -82,9 +82,9 @@ def error_of_the_scheme(steps, duration=0.02):
         predict(s, k, nm)
         q = interface_motion(s, k, 2 * nm, nm, ni, nq)
         spring = -STIFFNESS * s[q] - DAMPING * s[q + 2]
-        correct(s, k, np.array([spring, state[8]]), 0, nm, ni, nq)
+        correct(s, k, np.array([spring, state[8]]), 0, nm, ni)
         found = np.zeros((4, 1))
-        site_accelerations(s, k, 2 * nm, np.zeros(4), np.arange(4), found, 0, nm, ni, nq)
+        site_accelerations(s, k, 2 * nm, np.zeros(4), np.arange(4), found, 0, nm, ni)
         truth = (matrix @ state)[4:8]
         worst, largest = max(worst, np.abs(found[:, 0] - truth).max()), max(largest, np.abs(truth).max())
     return worst / largest

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from oracles.plain_lpm34 import CB, KM, KTS, RG, RP, Plain, matrices
 
-from gearsim_sim.model.lpm34 import make_gearbox
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.params import load_parallel_params
 
 
 @pytest.fixture(scope="module")
 def gearbox():
-    return make_gearbox(load_parallel_params(), seed=3)
+    return make_plant(load_parallel_params(), seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +38,8 @@ def series(one, per_turn=1):
 
 
 def both_errors(mesh):
-    parts = [series(mesh.pinion_error), series(mesh.gear_error)]
-    mean = mesh.pinion_error.mean + mesh.gear_error.mean
+    parts = [series(one.series) for one in mesh.errors]
+    mean = sum(one.series.mean for one in mesh.errors)
     joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
     return tuple(np.append(array, extra) for array, extra in zip(joined, (0, mean, 0), strict=True))
 
@@ -49,30 +49,31 @@ def test_right_hand_side_equals_the_flat_oracle(gearbox, trial):
     """At random states, with contacts open and closed and a spall under a ball."""
     from gearsim_sim.events import FaultSpec
     from gearsim_sim.model.faults import REGISTRY
-    from gearsim_sim.model.lpm34 import Moment
-    from gearsim_sim.params.parallel import BEARINGS
+    from gearsim_sim.model.plant import Moment
 
     rng = np.random.default_rng(trial)
     inner = bool(trial % 2)
-    bearing = gearbox.bearings[2]
+    bearing = gearbox.bearings[2].law
     turns = 0.5 + 10.0 * 0.0137 * trial
     cage = 2 * np.pi * bearing.cage_ratio * turns
     at = cage + bearing.azimuths_rad[3] + 0.3 * 0.8e-3 / bearing.outer_race_radius_m
     at = np.angle(np.exp(1j * (at - (2 * np.pi * turns if inner else 0))))
     kind = "inner_race_spall" if inner else "outer_race_spall"
     spec = FaultSpec(kind, "bearing_3", {"position_rad": float(at)})
-    spall = REGISTRY[kind].build(spec, BEARINGS, gearbox.bearings)
+    (spall,) = REGISTRY[kind].build(spec, gearbox).contributions
     plain = Plain(
         factor=bearing.load_factor,
         clearance=bearing.clearance_m,
-        stiffness=series(gearbox.mesh.stiffness, 32),
-        errors=both_errors(gearbox.mesh),
+        stiffness=series(gearbox.meshes[0].stiffness, 32),
+        errors=both_errors(gearbox.meshes[0]),
         turns=turns,
         spall={"bearing": 2, "inner": inner, "radius": spall.race_radius_m, "width": 0.8e-3, "at": at},
     )
     x, v = rng.normal(size=34) * 2e-5, rng.normal(size=34) * 1e-2
-    moment = Moment(turns, 10.0, (spall,))
-    assert gearbox.missing(2, moment)[3] > 1e-6  # the ball is over the spall
+    moment = Moment(turns, 10.0, ((spall, 1.0),))
+    assert (
+        gearbox.bearings[2].missing(gearbox.phases(turns), moment.faults)[3] > 1e-6
+    )  # the ball is over the spall
     ours = gearbox.acceleration(x, v, moment, gearbox.known_inputs(50.0))
     theirs = plain.acceleration(0.0, x, v)
     # Compared as forces relative to the largest one: that is how sums of forces round.

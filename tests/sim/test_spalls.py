@@ -1,6 +1,5 @@
 """Spalls: geometry, the ball's way through them, severity, and every entry of the registry."""
 
-import dataclasses
 import json
 
 import numpy as np
@@ -10,8 +9,8 @@ from gearsim_io.errors import InputError
 from gearsim_sim.engine import Engine
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.model.faults import REGISTRY, fault_kind
-from gearsim_sim.model.faults.spall import reachable_depth
-from gearsim_sim.model.lpm34 import make_gearbox
+from gearsim_sim.model.plants import make_plant
+from gearsim_sim.model.spall import Spall, reachable_depth
 from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.parallel import BEARINGS
 
@@ -25,12 +24,15 @@ def params():
 
 
 @pytest.fixture(scope="module")
-def bearings(params):
-    return make_gearbox(params, 1).bearings
+def plant(params):
+    return make_plant(params, 1)
 
 
-def build(bearings, kind, **given):
-    return REGISTRY[kind].build(FaultSpec(kind, "bearing_3", given), BEARINGS, bearings)
+def build(plant, kind, **given):
+    """The spall of that kind at bearing_3."""
+    (spall,) = REGISTRY[kind].build(FaultSpec(kind, "bearing_3", given), plant).contributions
+    assert isinstance(spall, Spall)
+    return spall
 
 
 def test_reachable_depth_of_the_thesis():
@@ -44,9 +46,9 @@ def test_reachable_depth_of_the_thesis():
 @pytest.mark.parametrize(
     ("kind", "radius", "sign"), [("outer_race_spall", OUTER, 1), ("inner_race_spall", INNER, -1)]
 )
-def test_path_of_the_ball_keeps_its_radius_from_the_edges(bearings, kind, radius, sign):
+def test_path_of_the_ball_keeps_its_radius_from_the_edges(plant, kind, radius, sign):
     """The centre of the ball, drawn in the plane, is one ball radius away from the nearer edge."""
-    spall = build(bearings, kind, width_m=1.5e-3)
+    spall = build(plant, kind, width_m=1.5e-3)
     edges = [radius * np.exp(1j * s * spall.half_width_rad) for s in (-1, 1)]
     for offset in np.linspace(-1, 1, 41) * spall.half_width_rad:
         path = radius - sign * BALL + sign * spall.drop(offset)
@@ -54,9 +56,9 @@ def test_path_of_the_ball_keeps_its_radius_from_the_edges(bearings, kind, radius
         assert distance == pytest.approx(BALL, rel=1e-12)
 
 
-def test_drop_is_smooth_but_for_the_change_of_edges(bearings):
+def test_drop_is_smooth_but_for_the_change_of_edges(plant):
     """No step anywhere, tangent to the race at entry, a sharp turn half-way."""
-    spall = build(bearings, "outer_race_spall")
+    spall = build(plant, "outer_race_spall")
     offsets = np.linspace(-1.2, 1.2, 24001) * spall.half_width_rad
     drop = np.array([spall.drop(offset) for offset in offsets])
     slope = np.diff(drop) / np.diff(offsets)
@@ -68,17 +70,17 @@ def test_drop_is_smooth_but_for_the_change_of_edges(bearings):
     assert others.max() < 0.001 * jumps[middle]
 
 
-def test_shallow_spall_carries_the_ball_on_its_floor(bearings):
-    spall = build(bearings, "outer_race_spall", width_m="3 mm", depth_m="10 um")
+def test_shallow_spall_carries_the_ball_on_its_floor(plant):
+    spall = build(plant, "outer_race_spall", width_m="3 mm", depth_m="10 um")
     assert spall.drop(0.0) == spall.drop(0.3 * spall.half_width_rad) == pytest.approx(10e-6)
     assert 0 < spall.drop(0.99 * spall.half_width_rad) < 10e-6
 
 
-def test_default_outer_spall_is_in_the_load_zone(bearings):
+def test_default_outer_spall_is_in_the_load_zone(plant):
     for i, name in enumerate(BEARINGS):
-        spec = FaultSpec("outer_race_spall", name)
-        spall = REGISTRY["outer_race_spall"].build(spec, BEARINGS, bearings)
-        assert spall.position_rad == bearings[i].load_direction_rad
+        fault = REGISTRY["outer_race_spall"].build(FaultSpec("outer_race_spall", name), plant)
+        assert fault.contributions[0].bearing == i
+        assert fault.contributions[0].position_rad == plant.bearings[i].law.load_direction_rad
 
 
 def ball_forces(engine, output, spall, bearing):
@@ -109,7 +111,7 @@ def crossings(forces):
 
 
 @pytest.mark.parametrize("kind", sorted(REGISTRY))
-def test_entry_to_impact_time(params, bearings, kind):
+def test_entry_to_impact_time(params, plant, kind):
     """About 0.6 ms for 0.8 mm at 10 Hz on either race (thesis 5.8).
 
     On the contact force of the ball: from entry, where 5 % of its load is gone, to the impact, where it
@@ -124,9 +126,11 @@ def test_entry_to_impact_time(params, bearings, kind):
         [FaultSpec(kind, "bearing_3")],
         probes=("b3_x.displacement_m", "b3_y.displacement_m"),
     )
-    spall = build(bearings, kind)
+    spall = build(plant, kind)
     times = []
-    for force in crossings(ball_forces(engine, engine.advance(int(0.5 * rate)), spall, bearings[2])):
+    for force in crossings(
+        ball_forces(engine, engine.advance(int(0.5 * rate)), spall, plant.bearings[2].law)
+    ):
         loose = np.flatnonzero(force == 0)
         assert loose.size > 0.1e-3 * rate  # contact is lost
         entry = np.flatnonzero(force < 0.95 * force[0])[0]
@@ -183,10 +187,10 @@ def test_severity_is_continuous_and_the_seed_decides(params, kind):
 
 
 @pytest.mark.parametrize("kind", sorted(REGISTRY))
-def test_parameters_survive_json_and_units(bearings, kind):
-    plain = build(bearings, kind, width_m=1.2e-3, depth_m=2e-5, position_rad=0.3, row=2)
-    worded = build(bearings, kind, width_m="1.2 mm", depth_m="20 um", position_rad="0.3 rad", row=2)
-    assert dataclasses.astuple(plain) == pytest.approx(dataclasses.astuple(worded), rel=1e-12)
+def test_parameters_survive_json_and_units(plant, kind):
+    plain = build(plant, kind, width_m=1.2e-3, depth_m=2e-5, position_rad=0.3, row=2)
+    worded = build(plant, kind, width_m="1.2 mm", depth_m="20 um", position_rad="0.3 rad", row=2)
+    assert plain.numbers() == pytest.approx(worded.numbers(), rel=1e-12)
     model = REGISTRY[kind].params_model
     dumped = json.loads(json.dumps(model.model_validate({"width_m": "1.2 mm"}).model_dump()))
     assert model.model_validate(dumped) == model.model_validate({"width_m": 1.2e-3})
@@ -219,17 +223,17 @@ def test_several_faults_add_up_to_more(params):
         ({"breadth": 1e-3}, "breadth"),
     ],
 )
-def test_impossible_parameters_are_named(bearings, given, field):
+def test_impossible_parameters_are_named(plant, given, field):
     with pytest.raises(InputError) as error:
-        build(bearings, "inner_race_spall", **given)
+        build(plant, "inner_race_spall", **given)
     assert error.value.field == field
 
 
-def test_unknown_kind_bearing_and_severity(bearings):
+def test_unknown_kind_bearing_and_severity(plant):
     with pytest.raises(InputError, match="outer_race_spall"):
         fault_kind("crack")
     with pytest.raises(InputError, match="bearing_3"):
-        REGISTRY["outer_race_spall"].build(FaultSpec("outer_race_spall", "gear"), BEARINGS, bearings)
+        REGISTRY["outer_race_spall"].build(FaultSpec("outer_race_spall", "gear"), plant)
     spec = FaultSpec("outer_race_spall", "bearing_1", severity=3.0)
     with pytest.raises(InputError, match="0 to 2"):
-        REGISTRY["outer_race_spall"].build(spec, BEARINGS, bearings)
+        REGISTRY["outer_race_spall"].build(spec, plant)

@@ -17,7 +17,8 @@ from scipy.integrate import solve_ivp
 
 from gearsim_sim.engine import Engine
 from gearsim_sim.integrate.modes import complex_modes
-from gearsim_sim.model.lpm34 import BEARING_SHAFT, SENSE, Gearbox, Moment, make_gearbox
+from gearsim_sim.model.plant import Moment, Plant
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.params import load_parallel_params
 
@@ -78,7 +79,7 @@ def rk45_real_time_factor(
     vectorised : bool
         The tuned right-hand side in place of the plain one.
     """
-    gearbox = make_gearbox(load_parallel_params(), 1)
+    gearbox = make_plant(load_parallel_params(), 1)
     model = VectorisedGearbox(gearbox) if vectorised else PlainGearbox(gearbox)
     start = rest_state(gearbox)
     best = math.inf
@@ -91,7 +92,7 @@ def rk45_real_time_factor(
     return seconds / best
 
 
-def rest_state(gearbox: Gearbox) -> Array:
+def rest_state(gearbox: Plant) -> Array:
     """Static equilibrium at the start, as (x, x')."""
     moment, u = Moment(TURNS, SPEED_HZ), gearbox.known_inputs(LOAD_NM)
     rest = static_equilibrium(gearbox, complex_modes(gearbox.system), moment, u)
@@ -101,15 +102,16 @@ def rest_state(gearbox: Gearbox) -> Array:
 class PlainGearbox:
     """d(state)/dt of state = (x, x'), x counted from the rigid rotation: bearing by bearing."""
 
-    def __init__(self, gearbox: Gearbox) -> None:
+    def __init__(self, gearbox: Plant) -> None:
         system = gearbox.system
         self._mass = np.diag(system.mass)
         self._damping, self._stiffness = system.damping, system.stiffness
         self._interfaces = system.interfaces
         self._constant = system.inputs @ gearbox.known_inputs(LOAD_NM)
-        self._bearings = gearbox.bearings
-        self._mesh, self._ratio = _TabledMesh(gearbox), gearbox.speed_ratio
-        self._nominal = gearbox.params.model.ball_bearing.nominal_stiffness_n_per_m
+        self._bearings = [seat.law for seat in gearbox.bearings]
+        self._mesh = _TabledMesh(gearbox)
+        self._cages = [gearbox.rates[seat.cage] for seat in gearbox.bearings]
+        self._nominal = gearbox.bearings[0].nominal_stiffness_n_per_m
 
     def __call__(self, t: float, state: Array) -> Array:
         """The derivative."""
@@ -118,9 +120,7 @@ class PlainGearbox:
         turns = TURNS + SPEED_HZ * t
         g = self._nominal * q
         for i, bearing in enumerate(self._bearings):
-            shaft = BEARING_SHAFT[i]
-            cage = SENSE[shaft] * bearing.cage_ratio * turns * (self._ratio if shaft else 1.0)
-            angle = bearing.azimuths_rad + 2 * np.pi * cage
+            angle = bearing.azimuths_rad + 2 * np.pi * self._cages[i] * turns
             cosine, sine = np.cos(angle), np.sin(angle)
             gap = np.maximum(q[2 * i] * cosine + q[2 * i + 1] * sine - bearing.clearance_m, 0.0)
             force = bearing.load_factor * gap**1.5
@@ -134,24 +134,18 @@ class PlainGearbox:
 class VectorisedGearbox:
     """The same, tuned as far as numpy goes."""
 
-    def __init__(self, gearbox: Gearbox) -> None:
-        system, bearings = gearbox.system, gearbox.bearings
+    def __init__(self, gearbox: Plant) -> None:
+        system, bearings = gearbox.system, [seat.law for seat in gearbox.bearings]
         inverse = 1.0 / np.diag(system.mass)[:, None]
         self._linear = -inverse * np.hstack([system.stiffness, system.damping])
         self._interfaces = inverse * system.interfaces
         self._motion = np.ascontiguousarray(system.interfaces.T)
         self._constant = (inverse * system.inputs) @ gearbox.known_inputs(LOAD_NM)
         self._azimuths = np.array([bearing.azimuths_rad for bearing in bearings])
-        ratios = (1.0, gearbox.speed_ratio)
-        self._cages = np.array(
-            [
-                2 * np.pi * SENSE[shaft] * bearing.cage_ratio * ratios[shaft]
-                for shaft, bearing in zip(BEARING_SHAFT, bearings, strict=True)
-            ]
-        )[:, None]
+        self._cages = 2 * np.pi * gearbox.rates[[seat.cage for seat in gearbox.bearings], None]
         self._factors = np.array([[bearing.load_factor] for bearing in bearings])
         self._clearances = np.array([[bearing.clearance_m] for bearing in bearings])
-        self._nominal = gearbox.params.model.ball_bearing.nominal_stiffness_n_per_m
+        self._nominal = gearbox.bearings[0].nominal_stiffness_n_per_m
         self._mesh = _TabledMesh(gearbox)
 
     def __call__(self, t: float, state: Array) -> Array:
@@ -177,11 +171,12 @@ class VectorisedGearbox:
 class _TabledMesh:
     """Force of the mesh beyond its linear part, from tables."""
 
-    def __init__(self, gearbox: Gearbox) -> None:
-        mesh = gearbox.mesh
+    def __init__(self, gearbox: Plant) -> None:
+        mesh = gearbox.meshes[0]
         self._mean, self._damping = mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m
-        self._teeth, self._ratio = mesh.pinion_teeth, gearbox.speed_ratio
-        self._tables = [_split(one.table()) for one in (mesh.stiffness, mesh.pinion_error, mesh.gear_error)]
+        self._teeth, self._ratio = mesh.cycles, float(gearbox.rates[1])
+        series = (mesh.stiffness, *(one.series for one in mesh.errors))
+        self._tables = [_split(one.table()) for one in series]
 
     def deviation(self, q: float, turns: float) -> float:
         """At a compression `q` without transmission error."""

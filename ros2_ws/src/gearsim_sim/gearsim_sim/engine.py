@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,9 @@ from gearsim_io.errors import InputError
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.integrate.decimate import HALF_LENGTH_SAMPLES, decimate, padded_taps
 from gearsim_sim.model.assembly import Vector
-from gearsim_sim.model.lpm34 import make_gearbox
-from gearsim_sim.params.parallel import ParallelParams
-from gearsim_sim.schedule import REBASE_STEPS, ActiveFault, Ramp, Schedule
+from gearsim_sim.model.plant import Plant, RotatingSite
+from gearsim_sim.model.plants import make_plant
+from gearsim_sim.schedule import REBASE_STEPS, ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Motion, Stepper
 from gearsim_sim.timeline import Timeline
 
@@ -27,14 +28,13 @@ SETTLING_S = 0.5
 _START_TURNS = 0.5  # so that whole turns of both shafts start from 0
 _BLOCK_SAMPLES = 512
 
-DEFAULT_SITES: dict[str, Vector] = {
-    f"b{number}_{axis}": {f"{axis}_p{number}": 1.0} for number in range(1, 5) for axis in "xy"
-}
-PROBE_NAMES = tuple(
-    f"{name}.{what}"
-    for name in (*(f"b{i}_x" for i in range(1, 5)), *(f"b{i}_y" for i in range(1, 5)), "mesh")
-    for what in ("displacement_m", "force_n")
-)
+Sites = Mapping[str, Vector | RotatingSite]
+PROBED = ("displacement_m", "force_n")
+
+
+def probe_names(plant: Plant) -> tuple[str, ...]:
+    """Further outputs that an engine can give: of each interface `PROBED`."""
+    return tuple(f"{name}.{what}" for name in plant.system.interface_names for what in PROBED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +52,9 @@ class EngineOutput:
     turns: NDArray[np.int64]  # (shafts, n) whole turns of each shaft's encoder, from 0 on
     fraction: NDArray[np.float64]  # (shafts, n) rest of the angle in turns, [0, 1)
     speed_hz: NDArray[np.float64]  # (shafts, n) d(angle)/dt in turns per second
+    signals: Mapping[str, NDArray[np.float64]] = field(
+        default_factory=dict
+    )  # name -> (n,) of `Plant.signals`
     probes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)  # name -> (n,)
 
     @property
@@ -61,15 +64,15 @@ class EngineOutput:
 
 
 class Engine:
-    """Integrates the parallel-shaft gearbox; owns all dynamic state.
+    """Integrates a machine; owns all dynamic state.
 
     A run starts from static equilibrium at speed and settles for 0.5 s before sample 0. The output is
     bitwise the same however it is split into calls, and depends on `seed` and the events only.
 
     Parameters
     ----------
-    params : ParallelParams
-        From `gearsim_sim.params.load_parallel_params`.
+    params : parameters of a machine
+        Such as those of `gearsim_sim.params.load_parallel_params`; any key of `model.plants.MAKERS`.
     seed : int
         Of the gears' pitch and surface errors, >= 0.
     sample_rate_hz : float
@@ -82,9 +85,9 @@ class Engine:
         Operating point at the start (default: that of the parameters).
     sites : mapping, optional
         Name of each site and its linear combination of degrees of freedom
-        (`{"b3_y": {"y_p3": 1.0}}`); default: the eight pedestal sites b1_x, b1_y ... b4_y.
+        (`{"b3_y": {"y_p3": 1.0}}`); default: those of the machine (pedestals b1_x, b1_y ... b4_y).
     probes : sequence of str
-        Further outputs out of `PROBE_NAMES`: displacement of a bearing or of the mesh (without
+        Further outputs out of `probe_names`: displacement of a bearing or of a mesh (without
         transmission error), contact force of the shaft on the pedestal, force of the mesh.
 
     Raises
@@ -95,7 +98,7 @@ class Engine:
 
     def __init__(
         self,
-        params: ParallelParams,
+        params: Any,
         seed: int,
         sample_rate_hz: float,
         oversampling: int = 4,
@@ -103,25 +106,26 @@ class Engine:
         *,
         speed_hz: float | None = None,
         load_nm: float | None = None,
-        sites: Mapping[str, Vector] | None = None,
+        sites: Sites | None = None,
         probes: Sequence[str] = (),
     ) -> None:
         _check_numbers(seed, sample_rate_hz, oversampling)
         self.params = params
         self.sample_rate_hz = float(sample_rate_hz)
         self._steps = max(oversampling, math.ceil(MIN_STEP_RATE_HZ / sample_rate_hz))
-        self._gearbox = make_gearbox(params, seed)
-        self._timeline = Timeline(self._gearbox, self.sample_rate_hz, self._steps)
-        drive = params.model.drive
-        speed_hz = self._timeline.checked_speed(drive.speed_hz if speed_hz is None else speed_hz)
-        load_nm = self._timeline.checked_load(drive.load_nm if load_nm is None else load_nm)
+        self.plant = make_plant(params, seed)
+        self._timeline = Timeline(self.plant, seed, self.sample_rate_hz, self._steps)
+        limits = self.plant.limits
+        speed_hz = self._timeline.checked_speed(limits.speed_hz if speed_hz is None else speed_hz)
+        load_nm = self._timeline.checked_load(limits.load_nm if load_nm is None else load_nm)
         self._sites = _checked_sites(
-            DEFAULT_SITES if sites is None else sites, self._gearbox.system.dof_names
+            self.plant.sites if sites is None else sites, self.plant.system.dof_names
         )
         self._probes = tuple(probes)
+        self._probe_names = probe_names(self.plant)
         for name in self._probes:
-            if name not in PROBE_NAMES:
-                raise InputError("engine", "probes", name, "one of " + ", ".join(PROBE_NAMES))
+            if name not in self._probe_names:
+                raise InputError("engine", "probes", name, "one of " + ", ".join(self._probe_names))
         self._prepare(speed_hz, load_nm, faults)
         self._settle()
         self.warm_up()
@@ -131,16 +135,16 @@ class Engine:
         step_s = 1.0 / (self.sample_rate_hz * self._steps)
         first = -HALF_LENGTH_SAMPLES * self._steps - math.ceil(SETTLING_S / step_s)
         turns = _START_TURNS + speed_hz * first * step_s
-        self._schedule = Schedule(self._gearbox, step_s, first, turns, speed_hz, load_nm)
+        self._schedule = Schedule(self.plant, step_s, first, turns, speed_hz, load_nm)
         for spec in faults:
-            spall = self._timeline.initial_spall(spec, first)
-            severity = Ramp(spall.severity, spall.severity)
-            self._schedule.faults[spec.name] = ActiveFault(spall, severity, first, 0.0)
+            fault = self._timeline.initial_fault(spec, first)
+            severity = Severity(fault.severity, fault.severity, first, 0.0)
+            self._schedule.faults[spec.name] = ActiveFault(fault, severity)
         probed = bool(self._probes)
-        self._stepper = Stepper(self._gearbox, self._schedule, self._sites, self._steps, probed=probed)
+        self._stepper = Stepper(self.plant, self._schedule, self._sites, self._steps, probed=probed)
         self._taps = padded_taps(self._steps)
         columns = (2 * HALF_LENGTH_SAMPLES + _BLOCK_SAMPLES) * self._steps + self._taps.size
-        self._accel = np.zeros((len(self._sites), columns))
+        self._accel = np.zeros((self._stepper.row_count, columns))
 
     def _settle(self) -> None:
         """Run up to the step before the one where the filter of sample 0 begins."""
@@ -163,7 +167,7 @@ class Engine:
     @property
     def shaft_names(self) -> tuple[str, ...]:
         """Names of the shafts whose encoders are put out."""
-        return (self.params.input_shaft, self.params.output_shaft)
+        return tuple(self.plant.encoders)
 
     @property
     def next_sample(self) -> int:
@@ -187,11 +191,11 @@ class Engine:
     @property
     def operating_point(self) -> tuple[float, float]:
         """Speed [Hz] and load [N m] that the latest begun ramp leads to."""
-        return self._schedule.speed.end_value, self._schedule.load.end_value
+        return self._schedule.segment.end_speed_hz, self._schedule.segment.end_load_nm
 
     def warm_up(self) -> None:
         """Compile everything that `advance` uses; the constructor has done so already."""
-        decimate(self._accel, 0, self._taps, self._steps, np.empty((len(self._sites), 1)), 0, 1)
+        decimate(self._accel, 0, self._taps, self._steps, np.empty((self._accel.shape[0], 1)), 0, 1)
 
     def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:
         """The next `n` samples; `events` are scheduled first. The split into calls changes no bit.
@@ -207,7 +211,7 @@ class Engine:
             raise InputError("engine", "n", n, "at least one sample")
         for event in events:
             self.schedule(event)
-        accel = np.empty((len(self._sites), n))
+        accel = np.empty((self._accel.shape[0], n))
         done = 0
         while done < n:
             count = min(n - done, _BLOCK_SAMPLES)
@@ -218,6 +222,8 @@ class Engine:
             done += count
         if not np.all(np.isfinite(accel)):
             raise FloatingPointError(f"the motion became infinite before sample {self._next + n}")
+        if self._stepper.row_count != len(self._sites):
+            accel = accel[self._stepper.site_rows]
         return self._output(accel, self._take_motions(n))
 
     def _output(self, accel: NDArray[np.float64], motion: Motion) -> EngineOutput:
@@ -225,7 +231,7 @@ class Engine:
         self._next += accel.shape[1]
         values = {
             name: (motion.displacements if i % 2 == 0 else motion.forces)[i // 2]
-            for i, name in enumerate(PROBE_NAMES)
+            for i, name in enumerate(self._probe_names)
             if name in self._probes
         }
         return EngineOutput(
@@ -236,6 +242,7 @@ class Engine:
             turns=motion.turns,
             fraction=motion.fraction,
             speed_hz=motion.speed_hz,
+            signals=dict(zip(self.plant.signals, motion.signals, strict=True)),
             probes=values,
         )
 
@@ -245,12 +252,13 @@ class Engine:
         stepper = self._stepper
         while stepper.step < to_step:
             step = stepper.step
+            self._schedule.go_on(step)
             self._timeline.apply(self._schedule, step)
             if step % REBASE_STEPS == 0:
                 self._schedule.rebase(step)
             stop = min(to_step, (step // REBASE_STEPS + 1) * REBASE_STEPS)
-            if self._timeline.next_step is not None:
-                stop = min(stop, self._timeline.next_step)
+            for change in (self._timeline.next_step, self._schedule.change_step):
+                stop = stop if change is None else min(stop, change)
             self._motions.append(stepper.advance(stop - step, self._accel, step + 1 - self._base_step))
 
     def _make_room(self, to_step: int) -> None:
@@ -324,12 +332,13 @@ def _check_numbers(seed: int, sample_rate_hz: float, oversampling: int) -> None:
         raise InputError("engine", "oversampling", oversampling, expected)
 
 
-def _checked_sites(sites: Mapping[str, Vector], dofs: tuple[str, ...]) -> dict[str, Vector]:
+def _checked_sites(sites: Sites, dofs: tuple[str, ...]) -> dict[str, Vector | RotatingSite]:
     if not sites:
         raise InputError("engine", "sites", "none", "at least one site")
-    for name, vector in sites.items():
-        unknown = [dof for dof in vector if dof not in dofs]
-        if unknown or not any(vector.values()):
-            expected = "a combination of degrees of freedom out of " + ", ".join(dofs)
-            raise InputError("engine", f"sites.{name}", unknown or vector, expected)
+    for name, site in sites.items():
+        for vector in (site.x, site.y) if isinstance(site, RotatingSite) else (site,):
+            unknown = [dof for dof in vector if dof not in dofs]
+            if unknown or not any(vector.values()):
+                expected = "a combination of degrees of freedom out of " + ", ".join(dofs)
+                raise InputError("engine", f"sites.{name}", unknown or vector, expected)
     return dict(sites)

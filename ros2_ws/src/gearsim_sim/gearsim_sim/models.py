@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
 
 from gearsim_sim.engine import Engine, EngineOutput
 from gearsim_sim.events import Event, FaultSpec
@@ -49,8 +50,12 @@ class RunningModel(Protocol):
         ...
 
 
-def _lpm34(scenario: Scenario) -> RunningModel:
+def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> RunningModel:
     params = load_parallel_params(scenario.machine_path, scenario.parameters, scenario.source)
+    return _engine(scenario, params.model_copy(update={"pedestals": pedestals}))
+
+
+def _engine(scenario: Scenario, params: Any) -> RunningModel:
     return Engine(
         params,
         scenario.seed,
@@ -62,4 +67,7 @@ def _lpm34(scenario: Scenario) -> RunningModel:
     )
 
 
-MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = {"lpm34": _lpm34}
+MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = {
+    "lpm22": partial(_parallel_shaft, pedestals=False),
+    "lpm34": partial(_parallel_shaft, pedestals=True),
+}

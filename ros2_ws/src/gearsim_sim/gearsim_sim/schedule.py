@@ -7,174 +7,233 @@ renewed at fixed steps: the rounding error does not grow with the length of a ru
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.integrate.pieces import plain_fading_slope, plain_ramp
-from gearsim_sim.model.faults.spall import Spall
-from gearsim_sim.model.lpm34 import BEARING_SHAFT, SENSE, Gearbox
-from gearsim_sim.model.lpm34_loop import SPALL_COLUMNS, Drive
+from gearsim_sim.integrate.pieces import DEGREE, plain_polynomial, plain_ramp
+from gearsim_sim.model.contributions import Contribution
+from gearsim_sim.model.faults import Fault
+from gearsim_sim.model.loop_data import COLUMNS, SEVERITY_COLUMNS, Drive
+from gearsim_sim.model.plant import Plant
 
+Array = NDArray[np.float64]
 REBASE_STEPS = 1 << 16
 
 
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch in which angle and load are polynomials of u = (step - start_step) / length_steps."""
+
+    start_step: int
+    length_steps: float
+    turns: Array  # coefficients, ascending, of the reference shaft's turns since start_step
+    load: Array  # coefficients, ascending [N m]
+    step_s: float
+    end_speed_hz: float  # what the segment leads to
+    end_load_nm: float
+    end_step: int | None  # None: it holds for good
+
+    def _u(self, step: int) -> float:
+        return float(step - self.start_step) / self.length_steps
+
+    def turns_at(self, step: int) -> float:
+        """Turns since the start."""
+        return plain_polynomial(self._u(step), self.turns)[0]
+
+    def speed_hz(self, step: int) -> float:
+        """Speed of the reference shaft."""
+        return plain_polynomial(self._u(step), self.turns)[1] / (self.length_steps * self.step_s)
+
+    def acceleration_hz_per_s(self, step: int) -> float:
+        """Its change."""
+        return plain_polynomial(self._u(step), self.turns)[2] / (self.length_steps * self.step_s) ** 2
+
+    def load_nm(self, step: int) -> float:
+        """Load torque."""
+        return plain_polynomial(self._u(step), self.load)[0]
+
+
+def steady(step: int, step_s: float, speed_hz: float, load_nm: float) -> Segment:
+    """Constant speed and load from a step on."""
+    return Segment(
+        step, 1.0, _filled([0.0, speed_hz * step_s]), _filled([load_nm]), step_s, speed_hz, load_nm, None
+    )
+
+
+def ramp(now: Segment, step: int, speed_hz: float, load_nm: float, steps: int) -> Segment:
+    """From the speed, acceleration and load that `now` has at `step` to others, without a jump of torque.
+
+    The speed follows 10 u^3 - 15 u^4 + 6 u^5, and u - 6 u^3 + 8 u^4 - 3 u^5 where it was changing already.
+    """
+    seconds = steps * now.step_s
+    start, load = now.speed_hz(step), now.load_nm(step)
+    change, fading = speed_hz - start, now.acceleration_hz_per_s(step) * seconds
+    rise = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+    speed = change * rise + fading * np.array([0.0, 1.0, 0.0, -6.0, 8.0, -3.0])
+    speed[0] = start
+    turns = np.concatenate([[0.0], speed / np.arange(1, 7)]) * seconds
+    torque = (load_nm - load) * rise
+    torque[0] = load
+    end = step + steps
+    return Segment(step, float(steps), _filled(turns), _filled(torque), now.step_s, speed_hz, load_nm, end)
+
+
+def _filled(coefficients: Sequence[float] | Array) -> Array:
+    result = np.zeros(DEGREE + 1)
+    result[: len(coefficients)] = coefficients
+    return result
+
+
 @dataclass(frozen=True, slots=True)
-class Ramp:
-    """From one value to another, starting at a step, with a slope that fades."""
+class Severity:
+    """From one severity to another, smoothly, starting at a step."""
 
     start_value: float
     end_value: float
-    start_slope: float = 0.0  # per step
+    start_step: int
+    steps: float
 
-    def value(self, since: float, steps: float) -> float:
-        """The value `since` steps after the start of a ramp of `steps`."""
-        rise, _, _ = plain_ramp(since, steps)
-        fading, _, _ = plain_fading_slope(since, steps)
-        return self.start_value + (self.end_value - self.start_value) * rise + self.start_slope * fading
+    def value(self, step: int) -> float:
+        """The severity at a step."""
+        rise, _, _ = plain_ramp(float(step - self.start_step), self.steps)
+        return self.start_value + (self.end_value - self.start_value) * rise
 
-    def slope(self, since: float, steps: float) -> float:
-        """Its change per step."""
-        _, rise, _ = plain_ramp(since, steps)
-        _, fading, _ = plain_fading_slope(since, steps)
-        return (self.end_value - self.start_value) * rise + self.start_slope * fading
-
-    def integral(self, since: float, steps: float) -> float:
-        """Its sum over the steps, as an integral."""
-        _, _, rise = plain_ramp(since, steps)
-        _, _, fading = plain_fading_slope(since, steps)
-        change = (self.end_value - self.start_value) * rise + self.start_slope * fading
-        return self.start_value * since + change
+    def gone(self, step: int) -> bool:
+        """Whether it has faded away for good."""
+        return self.end_value == 0.0 and step >= self.start_step + self.steps
 
 
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """A spall with the ramp of its severity."""
+    """A fault with the course of its severity."""
 
-    spall: Spall
-    severity: Ramp
-    start_step: int
-    ramp_steps: float
-
-    def severity_at(self, step: int) -> float:
-        """Severity at a step."""
-        return self.severity.value(float(step - self.start_step), self.ramp_steps)
-
-    def gone(self, step: int) -> bool:
-        """Whether it has faded away for good."""
-        return self.severity.end_value == 0.0 and step >= self.start_step + self.ramp_steps
+    fault: Fault
+    severity: Severity
 
 
 class Schedule:
     """Mutable: the present segment of the operating point, the anchor of the angles, the faults."""
 
     def __init__(
-        self, gearbox: Gearbox, step_s: float, first_step: int, turns: float, speed_hz: float, load_nm: float
+        self, plant: Plant, step_s: float, first_step: int, turns: float, speed_hz: float, load_nm: float
     ) -> None:
-        """Start at `first_step` with the rigid rotation at `turns` turns of the input shaft."""
-        ratios = [1.0, gearbox.speed_ratio]
-        for i, bearing in enumerate(gearbox.bearings):
-            shaft = BEARING_SHAFT[i]
-            ratios.append(SENSE[shaft] * bearing.cage_ratio * ratios[shaft])
-        self.rates: NDArray[np.float64] = np.array(ratios)
-        self._faults_on = gearbox.params.physics.faults
+        """Start at `first_step` with the reference shaft at `turns` turns."""
+        self._rates = plant.rates
+        self._faults_on = plant.faults_on
         self.step_s = step_s
-        self.speed = Ramp(speed_hz, speed_hz)
-        self.load = Ramp(load_nm, load_nm)
-        self.start_step = first_step
-        self.ramp_steps = 0.0
+        self.segment = steady(first_step, step_s, speed_hz, load_nm)
         self.anchor_step = first_step
-        whole = self.rates * turns
+        whole = plant.phases(turns)
         self.anchor_turns: NDArray[np.int64] = np.floor(whole).astype(np.int64)
-        self.anchor_phases: NDArray[np.float64] = whole - np.floor(whole)
+        self.anchor_phases: Array = whole - np.floor(whole)
+        self.reference_turns = turns
         self.faults: dict[str, ActiveFault] = {}
 
-    def speed_hz(self, step: int) -> float:
-        """Commanded speed of the input shaft."""
-        return self.speed.value(float(step - self.start_step), self.ramp_steps)
-
-    def load_nm(self, step: int) -> float:
-        """Commanded load torque."""
-        return self.load.value(float(step - self.start_step), self.ramp_steps)
+    @property
+    def change_step(self) -> int | None:
+        """Step at which the present segment ends, if it does."""
+        return self.segment.end_step
 
     def turns_since_anchor(self, step: int) -> float:
-        """Turns of the input shaft from the anchor to a step."""
-        now = self.speed.integral(float(step - self.start_step), self.ramp_steps)
-        then = self.speed.integral(float(self.anchor_step - self.start_step), self.ramp_steps)
-        return self.step_s * (now - then)
+        """Turns of the reference shaft from the anchor to a step."""
+        return self.segment.turns_at(step) - self.segment.turns_at(self.anchor_step)
+
+    def turns(self, step: int) -> float:
+        """Turns of the reference shaft; loses digits in long runs, for display and statics only."""
+        return self.reference_turns + self.turns_since_anchor(step)
 
     def rebase(self, step: int) -> None:
-        """Renew the anchor; forget a ramp that is over and faults that are gone."""
-        angle = self.anchor_phases + self.rates * self.turns_since_anchor(step)
+        """Renew the anchor; forget faults that are gone."""
+        passed = self.turns_since_anchor(step)
+        angle = self.anchor_phases + self._rates * passed
         whole = np.floor(angle)
         self.anchor_phases = angle - whole
         self.anchor_turns = self.anchor_turns + whole.astype(np.int64)
-        if step >= self.start_step + self.ramp_steps:
-            speed, load = self.speed.end_value, self.load.end_value
-            self.speed, self.load = Ramp(speed, speed), Ramp(load, load)
-            self.start_step, self.ramp_steps = step, 0.0
+        self.reference_turns += passed
         self.anchor_step = step
-        self.faults = {name: fault for name, fault in self.faults.items() if not fault.gone(step)}
+        if self.segment.end_step is None:
+            self.segment = steady(step, self.step_s, self.segment.end_speed_hz, self.segment.end_load_nm)
+        self.faults = {name: one for name, one in self.faults.items() if not one.severity.gone(step)}
 
-    def set_operating_point(self, step: int, speed_hz: float, load_nm: float, ramp_steps: float) -> None:
+    def go_on(self, step: int) -> None:
+        """Leave a segment that ends at this step."""
+        if self.segment.end_step == step:
+            self.rebase(step)
+            self.segment = steady(step, self.step_s, self.segment.end_speed_hz, self.segment.end_load_nm)
+
+    def set_operating_point(self, step: int, speed_hz: float, load_nm: float, ramp_steps: int) -> None:
         """Begin a ramp at this step, from the present speed, acceleration and load."""
-        since = float(step - self.start_step)
-        speed = Ramp(
-            self.speed.value(since, self.ramp_steps), speed_hz, self.speed.slope(since, self.ramp_steps)
-        )
-        load = Ramp(self.load.value(since, self.ramp_steps), load_nm)
+        following = ramp(self.segment, step, speed_hz, load_nm, ramp_steps)
         self.rebase(step)
-        self.speed, self.load, self.start_step, self.ramp_steps = speed, load, step, ramp_steps
+        self.segment = following
 
-    def grow(self, step: int, name: str, spall: Spall, ramp_steps: float) -> None:
-        """Let a fault's severity go from what it is to that of `spall`.
+    def grow(self, step: int, name: str, fault: Fault, ramp_steps: float) -> None:
+        """Let a fault's severity go from what it is to that of `fault`.
 
         If a fault of that name but of another geometry is still fading, it goes on fading beside. The
         anchor stays: a fault of severity zero must not change a bit.
         """
         old = self.faults.get(name)
-        if old is not None and replace(old.spall, severity=spall.severity) != spall:
-            self.faults[f"{name} until {old.start_step + int(old.ramp_steps)}"] = self.faults.pop(name)
+        if old is not None and not old.fault.same_but_severity(fault):
+            end = old.severity.start_step + int(old.severity.steps)
+            self.faults[f"{name} until {end}"] = self.faults.pop(name)
             old = None
-        now = 0.0 if old is None else old.severity_at(step)
-        self.faults[name] = ActiveFault(spall, Ramp(now, spall.severity), step, ramp_steps)
+        now = 0.0 if old is None else old.severity.value(step)
+        self.faults[name] = ActiveFault(fault, Severity(now, fault.severity, step, ramp_steps))
 
     def fade(self, step: int, name: str, ramp_steps: float) -> None:
         """Let a fault's severity go to zero."""
         if name in self.faults:
-            self.grow(step, name, replace(self.faults[name].spall, severity=0.0), ramp_steps)
+            self.grow(step, name, replace(self.faults[name].fault, severity=0.0), ramp_steps)
+
+    def contributions(self, step: int) -> tuple[tuple[Contribution, float], ...]:
+        """What the faults contribute at a step, with severities, as the readable model takes it."""
+        return tuple(
+            (one, active.severity.value(step))
+            for active in self.faults.values()
+            for one in active.fault.contributions
+        )
 
     def drive(self) -> Drive:
         """The present segment for the compiled loop."""
-        rows = [self._spall_row(fault) for fault in self.faults.values() if self._faults_on]
+        segment = self.segment
+        tables, samples = fault_tables(list(self.faults.values()) if self._faults_on else [])
         return Drive(
-            speed=np.array([self.speed.start_value, self.speed.end_value, self.speed.start_slope]),
-            load=np.array([self.load.start_value, self.load.end_value]),
-            start_step=self.start_step,
-            ramp_steps=self.ramp_steps,
+            turns=segment.turns,
+            load=segment.load,
+            start_step=segment.start_step,
+            length_steps=segment.length_steps,
+            steady=int(segment.end_step is None),
             anchor_step=self.anchor_step,
             anchor_phases=self.anchor_phases,
-            rates=self.rates,
-            spalls=np.array(rows, dtype=np.float64).reshape(len(rows), len(SPALL_COLUMNS)),
+            rates=self._rates,
+            need_rates=0,
+            samples=samples,
+            **tables,
         )
 
-    @staticmethod
-    def _spall_row(fault: ActiveFault) -> list[float]:
-        spall = fault.spall
-        sense = SENSE[BEARING_SHAFT[spall.bearing]] if spall.on_inner_race else 0.0
-        return [
-            spall.bearing,
-            spall.row,
-            sense,
-            spall.position_rad / (2 * math.pi),
-            spall.half_width_rad,
-            spall.depth_m,
-            spall.race_radius_m,
-            spall.ball_radius_m,
-            fault.severity.start_value,
-            fault.severity.end_value,
-            fault.start_step,
-            fault.ramp_steps,
-        ]
+
+def fault_tables(faults: Sequence[ActiveFault]) -> tuple[dict[str, Array], Array]:
+    """The tables of rows of `Drive`, and the samples that they refer to."""
+    rows: dict[str, list[list[float]]] = {table: [] for table in COLUMNS}
+    samples: list[Array] = []
+    at = 0
+    for active in faults:
+        severity = active.severity
+        ramped = [severity.start_value, severity.end_value, severity.start_step, severity.steps]
+        for one in active.fault.contributions:
+            row = [*ramped, *one.numbers()]
+            table = one.samples()
+            if table is not None:
+                row += [at, table.size // 2 - 1]
+                samples.append(table)
+                at += table.size
+            rows[one.table].append(row)
+    tables = {
+        name: np.array(found, dtype=np.float64).reshape(len(found), SEVERITY_COLUMNS + len(COLUMNS[name]))
+        for name, found in rows.items()
+    }
+    return tables, np.concatenate(samples) if samples else np.zeros(0)

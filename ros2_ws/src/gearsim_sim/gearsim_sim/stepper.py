@@ -1,4 +1,4 @@
-"""The 34-DOF model in motion: prepares the compiled loop and owns its state.
+"""A plant in motion: prepares the compiled loop and owns its state.
 
 `Stepper` knows steps of integration only; events, filtering and output samples are the engine's.
 """
@@ -11,29 +11,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.integrate.coefficients import Propagator, make_propagator, padded
+from gearsim_sim.integrate.coefficients import Propagator, make_propagator
 from gearsim_sim.integrate.kernel import pack_constants, pack_state
 from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.integrate.pieces import circle_table
 from gearsim_sim.model.assembly import LinearSystem, Vector
-from gearsim_sim.model.lpm34 import ENCODER_DOFS, Gearbox, Moment
-from gearsim_sim.model.lpm34_loop import INTERFACES, X_INTERFACES, Data, Part, make_loop
+from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop
+from gearsim_sim.model.loop_data import Data, Part
+from gearsim_sim.model.plant import Moment, Plant, RotatingSite, StateRow
+from gearsim_sim.model.plant_data import bearing_data, mesh_data
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.schedule import Schedule
 
 Array = NDArray[np.float64]
-# Bearings with fewer balls share the compiled loop of those with so many.
-_LEAST_BALLS = 24
 
 
 @dataclass(frozen=True, eq=False)
-class _PartSetup:
+class PartSetup:
     """One independent part of the system, ready for the loop."""
 
     names: tuple[str, ...]
-    propagator: Propagator
+    propagator: Propagator | None  # None: a part without degrees of freedom
     part: Part
     interfaces: NDArray[np.int64]  # indices of its interfaces in the whole system
+    state_rows: NDArray[np.int64]  # indices of the state rows that it gives
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,8 +44,9 @@ class Motion:
     turns: NDArray[np.int64]  # (shafts, n)
     fraction: Array  # (shafts, n)
     speed_hz: Array  # (shafts, n)
+    signals: Array  # (signals, n)
     displacements: Array  # (interfaces, n), empty unless probed
-    forces: Array  # (interfaces, n) contact forces and mesh force, empty unless probed
+    forces: Array  # (interfaces, n) contact and mesh forces, empty unless probed
 
 
 class Stepper:
@@ -52,12 +54,12 @@ class Stepper:
 
     Parameters
     ----------
-    gearbox : Gearbox
+    plant : Plant
         The model.
     schedule : Schedule
         Operating point, angles and faults; the stepper reads it at each call.
     sites : mapping
-        Name of each acceleration output and its combination of degrees of freedom.
+        Name of each acceleration output and where it is.
     oversampling : int
         Steps per output sample.
     probed : bool
@@ -66,42 +68,52 @@ class Stepper:
 
     def __init__(
         self,
-        gearbox: Gearbox,
+        plant: Plant,
         schedule: Schedule,
-        sites: Mapping[str, Vector],
+        sites: Mapping[str, Vector | RotatingSite],
         oversampling: int,
         *,
         probed: bool = False,
     ) -> None:
-        self._gearbox = gearbox
+        self._plant = plant
         self._schedule = schedule
         self._probed = probed
         self.step = schedule.anchor_step
         self.oversampling = oversampling
-        system = gearbox.system
-        matrix = np.array([system.direction(vector) for vector in sites.values()])
-        x_names = tuple(name for name in system.dof_names if name.startswith("x_"))
-        y_names = tuple(name for name in system.dof_names if not name.startswith("x_"))
-        x = _set_up(system, x_names, matrix, schedule.step_s, _x_rows(probed))
-        y = _set_up(system, y_names, matrix, schedule.step_s, _y_rows(gearbox, probed))
-        self._data = _loop_data(gearbox, x.part, y.part, schedule.step_s, oversampling)
-        balls = self._data.cosines.shape[1]
-        self._loop = make_loop(x.propagator.modes, y.propagator.modes, balls)
-        self._missing = np.zeros((4, balls))
-        self._state = self._rest(x, y)
+        vectors, self.site_rows, rotations = _site_rows(sites)
+        self._rows = _state_rows(plant, probed)
+        parts = [
+            set_up_part(plant.system, names, vectors, schedule.step_s, self._rows) for names in plant.parts
+        ]
+        if len(parts) == 1:
+            parts.append(_nothing(plant.system))
+        self._parts = (parts[0], parts[1])
+        # The loop numbers interfaces part by part.
+        self._place = np.argsort(np.concatenate([part.interfaces for part in parts]))
+        self._data = _loop_data(plant, parts, self._place, rotations, schedule.step_s, oversampling)
+        shape = self._data.bearings.cosines.shape
+        sizes = [size for part in parts for size in (part.part.length // 2, part.interfaces.size)]
+        self._loops = [make_loop(*sizes, shape[1], with_rates) for with_rates in (False, True)]
+        self._missing = np.zeros(shape)
+        self.row_count = len(vectors)
+        self._state = self._rest()
 
-    def _rest(self, x: _PartSetup, y: _PartSetup) -> tuple[Array, Array]:
+    def _rest(self) -> tuple[Array, Array]:
         """State of both parts at static equilibrium under the present load."""
-        system, schedule = self._gearbox.system, self._schedule
-        turns = float(schedule.anchor_turns[0] + schedule.anchor_phases[0])
-        spalls = tuple(fault.spall for fault in schedule.faults.values())
-        moment = Moment(turns, schedule.speed_hz(self.step), spalls)
-        u = self._gearbox.known_inputs(schedule.load_nm(self.step))
-        rest = static_equilibrium(self._gearbox, complex_modes(system), moment, u)
+        plant, schedule = self._plant, self._schedule
+        system = plant.system
+        moment = Moment(
+            schedule.turns(self.step), schedule.segment.speed_hz(self.step), schedule.contributions(self.step)
+        )
+        u = plant.known_inputs(schedule.segment.load_nm(self.step))
+        rest = static_equilibrium(plant, complex_modes(system), moment, u)
         motion = system.interfaces.T @ rest
-        forces = self._gearbox.interface_forces(motion, np.zeros(motion.size), moment)
+        forces = plant.interface_forces(motion, np.zeros(motion.size), moment)
         states = []
-        for setup in (x, y):
+        for setup in self._parts:
+            if setup.propagator is None:
+                states.append(np.zeros(0))
+                continue
             own = rest[[system.dof(name) for name in setup.names]]
             z = setup.propagator.modal(own, np.zeros_like(own))
             known = u @ setup.propagator.left_known
@@ -110,80 +122,107 @@ class Stepper:
 
     def advance(self, count: int, accel: Array, column: int) -> Motion:
         """Integrate `count` steps; accelerations go to accel[:, column : column + count]."""
+        width = MOTION_COLUMNS + len(self._rows) + self._place.size
+        motion = np.empty((count // self.oversampling + 1, width))
+        s0, s1 = self._state
         drive = self._schedule.drive()
-        rows = 2 + self._data.x.state_rows.shape[0] + self._data.y.state_rows.shape[0] + INTERFACES
-        motion = np.empty((count // self.oversampling + 1, rows))
-        sx, sy = self._state
-        samples = self._loop(
-            sx, sy, self._data, drive, self._missing, self.step, count, accel, column, motion
+        samples = self._loops[drive.need_rates](
+            s0, s1, self._data, drive, self._missing, self.step, count, accel, column, motion
         )
         self.step += count
         return self._unpack(motion[:samples].T)
 
-    def _unpack(self, rows: Array) -> Motion:
-        """Angles from the turns since the anchor and the twist of the encoders, and probes."""
-        schedule, ratios = self._schedule, self._schedule.rates[:2, None]
-        passed, speed = rows[0], rows[1]
-        x_rows = X_INTERFACES if self._probed else 0
-        y_rows = rows[2 + x_rows :]
-        angle = schedule.anchor_phases[:2, None] + ratios * passed + y_rows[:2] / (2 * np.pi)
+    def _unpack(self, columns: Array) -> Motion:
+        """Angles from the turns since the anchor and the twist of the encoders, signals, probes."""
+        schedule, plant = self._schedule, self._plant
+        passed, speed = columns[0], columns[1]
+        given = np.concatenate([part.state_rows for part in self._parts])
+        rows = np.empty((given.size, passed.size))
+        rows[given] = columns[MOTION_COLUMNS : MOTION_COLUMNS + given.size]
+        tracks = [track for track, _ in plant.encoders.values()]
+        shafts, signals = len(tracks), len(plant.signals)
+        ratios = plant.rates[tracks, None]
+        angle = schedule.anchor_phases[tracks, None] + ratios * passed + rows[:shafts] / (2 * np.pi)
         whole = np.floor(angle)
         displacements = forces = np.zeros((0, passed.size))
         if self._probed:
-            displacements = np.vstack([rows[2 : 2 + x_rows], y_rows[4:9]])
-            forces = self._total_forces(displacements, y_rows[9], rows[-INTERFACES:])
+            count = self._place.size
+            displacements, rates = rows[-2 * count : -count], rows[-count:]
+            deviations = columns[MOTION_COLUMNS + given.size :][self._place]
+            forces = self._total_forces(displacements, rates, deviations)
         return Motion(
-            turns=schedule.anchor_turns[:2, None] + whole.astype(np.int64),
+            turns=schedule.anchor_turns[tracks, None] + whole.astype(np.int64),
             fraction=angle - whole,
-            speed_hz=ratios * speed + y_rows[2:4] / (2 * np.pi),
+            speed_hz=ratios * speed + rows[shafts : 2 * shafts] / (2 * np.pi),
+            signals=rows[2 * shafts : 2 * shafts + signals],
             displacements=displacements,
             forces=forces,
         )
 
-    def _total_forces(self, displacements: Array, mesh_rate: Array, deviations: Array) -> Array:
+    def _total_forces(self, displacements: Array, rates: Array, deviations: Array) -> Array:
         """Contact and mesh forces from the deviations that the loop works with."""
-        stiffness = np.full((INTERFACES, 1), self._data.nominal_stiffness)
-        stiffness[-1] = self._data.mesh[0]
-        total = stiffness * displacements - deviations
-        total[-1] += self._data.mesh[1] * mesh_rate
-        return np.asarray(total)
+        stiffness, damping = np.zeros((2, self._place.size, 1))
+        for seat in self._plant.bearings:
+            stiffness[[seat.x, seat.y]] = seat.nominal_stiffness_n_per_m
+        for mesh in self._plant.meshes:
+            stiffness[mesh.interface] = mesh.mean_stiffness_n_per_m
+            damping[mesh.interface] = mesh.damping_ns_per_m
+        return np.asarray(stiffness * displacements + damping * rates - deviations)
 
 
-def _x_rows(probed: bool) -> list[tuple[Vector, bool]]:
-    """State outputs of the x part: displacements of the bearings."""
-    return [({f"x_s{i}": 1.0, f"x_p{i}": -1.0}, False) for i in range(1, 5)] if probed else []
+def _site_rows(
+    sites: Mapping[str, Vector | RotatingSite],
+) -> tuple[list[Vector], NDArray[np.int64], Array]:
+    """Rows of acceleration, the row of each site, and which rows turn; a rotating site takes two rows."""
+    rows: list[Vector] = []
+    own, rotations = [], []
+    for site in sites.values():
+        own.append(len(rows))
+        if isinstance(site, RotatingSite):
+            rotations.append([len(rows), site.track, site.sense, site.offset_turns])
+            rows += [site.x, site.y]
+        else:
+            rows.append(site)
+    return rows, np.array(own, dtype=np.int64), np.array(rotations, dtype=np.float64).reshape(-1, 4)
 
 
-def _y_rows(gearbox: Gearbox, probed: bool) -> list[tuple[Vector, bool]]:
-    """State outputs of the y part: twist of the encoders and its rate; probes as in `Stepper._unpack`."""
-    rows: list[tuple[Vector, bool]] = [({dof: 1.0}, rate) for rate in (False, True) for dof in ENCODER_DOFS]
+def _state_rows(plant: Plant, probed: bool) -> list[StateRow]:
+    """Twist of the encoders, its rate, signals; of all interfaces displacement and rate if probed."""
+    encoders = [vector for _, vector in plant.encoders.values()]
+    rows = [StateRow(vector) for vector in encoders]
+    rows += [StateRow({}, vector) for vector in encoders]
+    rows += list(plant.signals.values())
     if probed:
-        system = gearbox.system
-        mesh = dict(zip(system.dof_names, system.interfaces[:, -1].tolist(), strict=True))
-        mesh = {name: value for name, value in mesh.items() if value}
-        rows += [({f"y_s{i}": 1.0, f"y_p{i}": -1.0}, False) for i in range(1, 5)]
-        rows += [(mesh, False), (mesh, True)]
+        system = plant.system
+        columns = [
+            {name: value for name, value in zip(system.dof_names, column, strict=True) if value}
+            for column in system.interfaces.T.tolist()
+        ]
+        rows += [StateRow(column) for column in columns] + [StateRow({}, column) for column in columns]
     return rows
 
 
-def _set_up(
+def set_up_part(
     system: LinearSystem,
     names: tuple[str, ...],
-    sites: Array,
+    sites: Sequence[Vector],
     step_s: float,
-    rows: Sequence[tuple[Vector, bool]],
-) -> _PartSetup:
-    """Cut out a part, with the sites that feel it."""
+    rows: Sequence[StateRow],
+) -> PartSetup:
+    """Cut out a part, with the sites that feel it and the state rows that it gives."""
     part = system.part(names)
-    own = sites[:, [system.dof(name) for name in names]]
+    matrix = np.array([system.direction(vector) for vector in sites])
+    own = matrix[:, [system.dof(name) for name in names]]
     felt = np.flatnonzero(np.any(own != 0, axis=1))
-    propagator = make_propagator(part, step_s, own[felt])
+    propagator = make_propagator(part, step_s, own[felt], rates=True)
     linear = propagator.linear
+    mine = [i for i, row in enumerate(rows) if any(name in names for name in (*row.displacement, *row.rate))]
     shapes = [
-        part.direction(vector) @ (linear.shapes_rate if rate else linear.shapes) for vector, rate in rows
+        part.direction(rows[i].displacement) @ linear.shapes
+        + part.direction(rows[i].rate) @ linear.shapes_rate
+        for i in mine
     ]
-    matrix = np.array(shapes, dtype=np.complex128).reshape(len(rows), linear.eigenvalues.size)
-    return _PartSetup(
+    return PartSetup(
         names=names,
         propagator=propagator,
         part=Part(
@@ -192,41 +231,51 @@ def _set_up(
             left_known=propagator.left_known,
             site_known=np.ascontiguousarray(propagator.site_known),
             site_index=felt.astype(np.int64),
-            state_rows=propagator.output_rows(matrix),
+            state_rows=propagator.output_rows(
+                np.array(shapes, dtype=np.complex128).reshape(len(mine), linear.eigenvalues.size)
+            ),
         ),
-        interfaces=np.array([system.interface_names.index(name) for name in part.interface_names]),
+        interfaces=np.array(
+            [system.interface_names.index(name) for name in part.interface_names], dtype=np.int64
+        ),
+        state_rows=np.array(mine, dtype=np.int64),
     )
 
 
-def _loop_data(gearbox: Gearbox, x: Part, y: Part, step_s: float, oversampling: int) -> Data:
-    """Constants of the force elements for the loop."""
-    params, mesh, bearings = gearbox.params, gearbox.mesh, gearbox.bearings
-    balls = padded(max(_LEAST_BALLS, *(bearing.ball_count for bearing in bearings)))
-    cosines, sines = np.zeros((4, balls)), np.zeros((4, balls))
-    row_offsets = np.zeros((4, 2))
-    for i, bearing in enumerate(bearings):
-        cosines[i, : bearing.ball_count] = np.cos(bearing.azimuths_rad)
-        sines[i, : bearing.ball_count] = np.sin(bearing.azimuths_rad)
-        first = bearing.azimuths_rad[:: bearing.balls_per_row]
-        row_offsets[i, : first.size] = first / (2 * np.pi)
-    inertia = float(gearbox.rigid @ gearbox.system.mass @ gearbox.rigid)
+def _nothing(system: LinearSystem) -> PartSetup:
+    """A part without degrees of freedom, in place of the second."""
+    inputs = len(system.input_names)
+    empty = np.zeros(0, dtype=np.int64)
+    part = Part(
+        k=np.zeros(0),
+        length=0,
+        left_known=np.zeros((inputs, 0)),
+        site_known=np.zeros((0, inputs)),
+        site_index=empty,
+        state_rows=np.zeros((0, 0)),
+    )
+    return PartSetup(names=(), propagator=None, part=part, interfaces=empty, state_rows=empty)
+
+
+def _loop_data(
+    plant: Plant,
+    parts: Sequence[PartSetup],
+    place: NDArray[np.int64],
+    rotations: Array,
+    step_s: float,
+    oversampling: int,
+) -> Data:
+    """Constants of the loop; `place` is that of each interface in the loop's order."""
     return Data(
-        x=x,
-        y=y,
+        first=parts[0].part,
+        second=parts[1].part,
+        bearings=bearing_data(plant, place),
+        meshes=mesh_data(plant, place),
         circle=circle_table(),
-        stiffness=mesh.stiffness.table(),
-        pinion_error=mesh.pinion_error.table(),
-        gear_error=mesh.gear_error.table(),
-        mesh=np.array([mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m, float(mesh.pinion_teeth)]),
-        bearings=np.array([[bearing.load_factor, bearing.clearance_m] for bearing in bearings]),
-        cosines=cosines,
-        sines=sines,
-        row_offsets=row_offsets,
-        balls_per_row=np.array([bearing.balls_per_row for bearing in bearings]),
-        nominal_stiffness=params.model.ball_bearing.nominal_stiffness_n_per_m,
-        inertia=inertia,
-        speed_ratio=float(gearbox.speed_ratio),
-        gravity=float(gearbox.known_inputs(0.0)[2]),
+        rotations=rotations,
+        inertia=plant.inertia_kg_m2,
+        torque_ratios=np.array(plant.torque_ratios),
+        gravity=plant.gravity_m_per_s2,
         step_s=step_s,
         oversampling=oversampling,
     )

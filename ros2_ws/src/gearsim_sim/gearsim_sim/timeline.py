@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from gearsim_io.errors import InputError
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
-from gearsim_sim.model.faults import fault_kind
-from gearsim_sim.model.faults.spall import Spall
-from gearsim_sim.model.lpm34 import Gearbox
-from gearsim_sim.params.parallel import BEARINGS
+from gearsim_sim.model.faults import Fault, fault_kind
+from gearsim_sim.model.plant import Plant
 from gearsim_sim.schedule import Schedule
 
 # No ramp is shorter: a jump of geometry or torque would be a click that no rig can make.
@@ -22,11 +20,11 @@ _PEAK_SLOPE = 1.875  # greatest slope of the ramp's polynomial over its mean slo
 
 @dataclass(frozen=True, slots=True)
 class _FaultChange:
-    """A line in the log of faults: a spall that begins, or the end of `name` ("" for all)."""
+    """A line in the log of faults: a fault that begins, or the end of `name` ("" for all)."""
 
     step: int
     name: str
-    spall: Spall | None
+    fault: Fault | None
 
 
 class Timeline:
@@ -34,16 +32,19 @@ class Timeline:
 
     Parameters
     ----------
-    gearbox : Gearbox
+    plant : Plant
         For limits and geometry.
+    seed : int
+        Of the run.
     sample_rate_hz : float
         Rate of the samples.
     steps_per_sample : int
         Integration steps per sample.
     """
 
-    def __init__(self, gearbox: Gearbox, sample_rate_hz: float, steps_per_sample: int) -> None:
-        self._gearbox = gearbox
+    def __init__(self, plant: Plant, seed: int, sample_rate_hz: float, steps_per_sample: int) -> None:
+        self._plant = plant
+        self._seed = seed
         self._rate_hz = sample_rate_hz
         self._steps = steps_per_sample
         self._queue: list[tuple[int, Callable[[Schedule, int], None]]] = []
@@ -59,14 +60,14 @@ class Timeline:
         while self._queue and self._queue[0][0] == step:
             self._queue.pop(0)[1](schedule, step)
 
-    def initial_spall(self, spec: FaultSpec, first_step: int) -> Spall:
+    def initial_fault(self, spec: FaultSpec, first_step: int) -> Fault:
         """A fault that is there from the start; each needs a name of its own."""
         if any(change.name == spec.name for change in self._log):
             expected = "a fault_id of its own, since another fault has that name"
             raise InputError(f"fault {spec.name}", "fault_id", spec.name, expected)
-        spall = self._build(spec)
-        self._note(_FaultChange(first_step, spec.name, spall))
-        return spall
+        fault = self._build(spec)
+        self._note(_FaultChange(first_step, spec.name, fault))
+        return fault
 
     def add(self, event: Event, earliest: int) -> int:
         """Check and queue an event; returns its sample, the `earliest` one if none was given."""
@@ -87,18 +88,18 @@ class Timeline:
         self._queue.insert(place, (step, action))
         return sample
 
-    def _ramp_steps(self, ramp_s: float) -> float:
+    def _ramp_steps(self, ramp_s: float) -> int:
         samples = max(1, round(max(ramp_s, MIN_RAMP_S) * self._rate_hz))
-        return float(samples * self._steps)
+        return samples * self._steps
 
     def _operating_point(self, event: SetOperatingPoint) -> Callable[[Schedule, int], None]:
         speed = None if event.speed_hz is None else self.checked_speed(event.speed_hz)
         load = None if event.load_nm is None else self.checked_load(event.load_nm)
 
         def action(schedule: Schedule, step: int) -> None:
-            new_speed = schedule.speed.end_value if speed is None else speed
-            new_load = schedule.load.end_value if load is None else load
-            shortest = self._shortest_ramp_s(new_speed - schedule.speed_hz(step))
+            new_speed = schedule.segment.end_speed_hz if speed is None else speed
+            new_load = schedule.segment.end_load_nm if load is None else load
+            shortest = self._shortest_ramp_s(new_speed - schedule.segment.speed_hz(step))
             steps = self._ramp_steps(max(event.ramp_s, shortest))
             schedule.set_operating_point(step, new_speed, new_load, steps)
 
@@ -106,37 +107,36 @@ class Timeline:
 
     def _shortest_ramp_s(self, speed_change_hz: float) -> float:
         """What the drive's torque needs for a change of speed."""
-        inertia = float(self._gearbox.rigid @ self._gearbox.system.mass @ self._gearbox.rigid)
-        torque = self._gearbox.params.model.drive.acceleration_torque_nm
-        return _PEAK_SLOPE * 2 * math.pi * abs(speed_change_hz) * inertia / torque
+        torque = self._plant.limits.acceleration_torque_nm
+        return _PEAK_SLOPE * 2 * math.pi * abs(speed_change_hz) * self._plant.inertia_kg_m2 / torque
 
     def checked_speed(self, speed_hz: float) -> float:
         """A speed within the limits of the drive."""
-        limit = self._gearbox.params.model.drive.speed_limit_hz
+        limit = self._plant.limits.speed_limit_hz
         if not 0 <= speed_hz <= limit:
             raise InputError("operating point", "speed_hz", speed_hz, f"0 to {limit:g} Hz")
         return float(speed_hz)
 
     def checked_load(self, load_nm: float) -> float:
         """A load within the limits of the drive."""
-        limit = self._gearbox.params.model.drive.load_limit_nm
+        limit = self._plant.limits.load_limit_nm
         if not 0 <= load_nm <= limit:
             raise InputError("operating point", "load_nm", load_nm, f"0 to {limit:g} N m")
         return float(load_nm)
 
-    def _build(self, spec: FaultSpec) -> Spall:
-        return fault_kind(spec.kind).build(spec, BEARINGS, self._gearbox.bearings)
+    def _build(self, spec: FaultSpec) -> Fault:
+        return fault_kind(spec.kind).build(spec, self._plant, self._seed)
 
     def _inject(self, event: Inject, step: int) -> Callable[[Schedule, int], None]:
         name = event.fault.name
-        spall = self._build(event.fault)
+        fault = self._build(event.fault)
         running = self._faults_at(step).get(name)
-        if running is not None and replace(running, severity=spall.severity) != spall:
+        if running is not None and not running.same_but_severity(fault):
             expected = "another name, or the same parameters with another severity, or to clear it before"
             raise InputError(f"fault {name}", "fault_id", name, expected)
-        self._note(_FaultChange(step, name, spall))
+        self._note(_FaultChange(step, name, fault))
         ramp_steps = self._ramp_steps(event.ramp_s)
-        return lambda schedule, now: schedule.grow(now, name, spall, ramp_steps)
+        return lambda schedule, now: schedule.grow(now, name, fault, ramp_steps)
 
     def _clear(self, event: Clear, step: int) -> Callable[[Schedule, int], None]:
         running = self._faults_at(step)
@@ -156,14 +156,14 @@ class Timeline:
         self._log.append(change)
         self._log.sort(key=lambda entry: entry.step)  # stable: equal steps keep the order of asking
 
-    def _faults_at(self, step: int) -> dict[str, Spall]:
+    def _faults_at(self, step: int) -> dict[str, Fault]:
         """Faults that will run at this step by what has been asked for so far."""
-        running: dict[str, Spall] = {}
+        running: dict[str, Fault] = {}
         for change in self._log:
             if change.step > step:
                 break
-            if change.spall is not None:
-                running[change.name] = change.spall
+            if change.fault is not None:
+                running[change.name] = change.fault
             elif change.name:
                 running.pop(change.name, None)
             else:

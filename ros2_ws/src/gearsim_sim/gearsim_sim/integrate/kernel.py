@@ -1,16 +1,19 @@
 """One step of the cubic exponential scheme, compiled: generic in the system, blind to what the forces are.
 
-A model's loop calls, for each step and each independent part of its system, `predict` and
-`interface_motion`, then its own force function, then `correct` and `site_accelerations`. All numbers of a
-part live in two flat arrays, `k` (constants) and `s` (state), so that the compiler sees that nothing
-overlaps. Sizes must be compile-time constants of the calling loop (closure variables): `nm` modes (a
-multiple of LANES), `ni` interfaces, `nq` interface motions; only the number of sites may vary.
+A loop calls, for each step and each independent part of its system, `predict` and `interface_motion`, then
+its own force functions, then `correct` and `site_accelerations`. All numbers of a part live in two flat
+arrays, `k` (constants) and `s` (state), so that the compiler sees that nothing overlaps. Sizes must be
+compile-time constants of the calling loop (closure variables): `nm` modes (a multiple of LANES), `ni`
+interfaces and `nq` of their motions; only the number of sites may vary. What does not change within a run
+must not decide a branch in the loop: the compiler would copy the whole loop for it.
 Layout, in units of doubles:
 
     k: decay 2nm | c0 2nm | c1 2nm | c2 2nm | c3 2nm | left ni 2nm
-       | motions: rows nq 2nm, compliance nq ni | sites: rows ns 2nm, compliance ns ni
+       | displacement rows ni 2nm | rate rows ni 2nm | their compliance 2ni ni
+       | sites: rows ns 2nm, compliance ns ni
     s: z 2nm | predicted z 2nm | force known now 2nm | forces of the last three instants 3 x 2nm
-       | motion rows nq | motions nq | interface forces: now and the last two, 3 ni | site rows ns
+       | rows 2ni | motions: displacements ni, rates ni | interface forces: now and the last two, 3 ni
+       | site rows ns
 
 Complex numbers are split: nm real parts, then nm imaginary parts.
 """
@@ -28,7 +31,7 @@ Indices = NDArray[np.int64]
 
 
 def pack_constants(propagator: Propagator) -> Array:
-    """The array `k`."""
+    """The array `k`; the propagator must have the rates of its interfaces."""
     nq, ni, nm2 = propagator.motions, propagator.interfaces, 2 * propagator.modes
     rows, compliance = propagator.rows.reshape(-1, nm2), propagator.compliance.reshape(-1, ni)
     parts = (
@@ -111,16 +114,16 @@ def times_state(s: Array, k: Array, rows: int, count: int, length: int, n2: int,
 def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int) -> int:
     """The motion of the interfaces at the next instant, with extrapolated forces.
 
-    Returns where in `s` the motion starts: `nq` displacements (and rates, if the rows have them). The
-    new forces enter through the compliance of one step only, so their extrapolation by a parabola is
-    plenty: it is wrong by far less than the scheme. `length` is 2 nm, see `times_state`.
+    Returns where in `s` the motion starts: `ni` displacements, and behind them `ni` rates if `nq` is 2 ni
+    and not ni. The new forces enter through the compliance of one step only, so their extrapolation by a
+    parabola is plenty: it is wrong by far less than the scheme. `length` is 2 nm, see `times_state`.
     """
     n2 = 2 * nm
     rows = 5 * n2 + ni * n2
-    comp = rows + nq * n2
+    comp = rows + 2 * ni * n2
     y = 6 * n2
-    q = y + nq
-    g = q + nq
+    q = y + 2 * ni
+    g = q + 2 * ni
     times_state(s, k, rows, nq, length, n2, y)
     for i in range(nq):
         total = s[y + i]
@@ -132,11 +135,11 @@ def interface_motion(s: Array, k: Array, length: int, nm: int, ni: int, nq: int)
 
 
 @inlined
-def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: int) -> None:
+def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int) -> None:
     """Take the new interface forces, forces[at : at + ni], into the mode coordinates and the history."""
     n2 = 2 * nm
     left = 5 * n2
-    g = 6 * n2 + 2 * nq
+    g = 6 * n2 + 4 * ni
     for m in range(nm):
         s[5 * n2 + m] = s[4 * n2 + m]
         s[5 * n2 + nm + m] = s[4 * n2 + nm + m]
@@ -159,9 +162,8 @@ def correct(s: Array, k: Array, forces: Array, at: int, nm: int, ni: int, nq: in
 
 @inlined
 def site_accelerations(
-    s: Array, k: Array, length: int, known: Array, index: Indices, out: Array, column: int,
-    nm: int, ni: int, nq: int,
-) -> None:  # fmt: skip
+    s: Array, k: Array, length: int, known: Array, index: Indices, out: Array, column: int, nm: int, ni: int
+) -> None:
     """Accelerations of the sites from the equation of motion, added to out[index, column].
 
     They follow from the predicted mode coordinates, the new interface forces and `known`, what the
@@ -169,9 +171,9 @@ def site_accelerations(
     """
     n2 = 2 * nm
     ns = known.size & 0xFFFF
-    rows = 5 * n2 + ni * n2 + nq * n2 + nq * ni
+    rows = 5 * n2 + 3 * ni * n2 + 2 * ni * ni
     comp = rows + ns * n2
-    g = 6 * n2 + 2 * nq
+    g = 6 * n2 + 4 * ni
     y = g + 3 * ni
     times_state(s, k, rows, ns, length, n2, y)
     for i in range(ns):

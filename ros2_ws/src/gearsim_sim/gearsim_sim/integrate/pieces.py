@@ -11,6 +11,7 @@ from gearsim_sim.integrate.compiled import inlined
 
 Array = NDArray[np.float64]
 _CIRCLE_POINTS = 256
+DEGREE = 7  # of polynomials; lower ones are filled up with zeros
 
 
 def circle_table() -> Array:
@@ -34,13 +35,16 @@ def cosine_sine(turns: float, circle: Array) -> tuple[float, float]:
 
 
 @inlined
-def table_value(turns: float, table: Array) -> tuple[float, float]:
-    """Value and slope per turn of a tabled periodic function (`PeriodicSeries.table`), turns >= 0."""
-    points = table.size // 2 - 1
+def table_value(turns: float, tables: Array, offset: int, points: int) -> tuple[float, float]:
+    """Value and slope per turn of a tabled periodic function, turns >= 0.
+
+    The table, as `PeriodicSeries.table` makes it for `points` intervals, begins at `offset` of `tables`.
+    """
     scaled = (turns - math.floor(turns)) * points
     i = min(int(scaled), points - 1)
     t = scaled - i
-    v0, d0, v1, d1 = table[2 * i], table[2 * i + 1], table[2 * i + 2], table[2 * i + 3]
+    at = offset + 2 * i
+    v0, d0, v1, d1 = tables[at], tables[at + 1], tables[at + 2], tables[at + 3]
     rise = v1 - v0
     a = d0 - rise
     b = rise - d1
@@ -48,6 +52,18 @@ def table_value(turns: float, table: Array) -> tuple[float, float]:
     value = u * v0 + t * v1 + t * u * (a * u + b * t)
     slope = rise + (1.0 - 2.0 * t) * (a * u + b * t) + t * u * (b - a)
     return value, slope * points
+
+
+def plain_polynomial(u: float, coefficients: Array) -> tuple[float, float, float]:
+    """Value and first two derivatives of sum(coefficients[i] u^i), which has DEGREE + 1 coefficients."""
+    value = 0.0
+    first = 0.0
+    second = 0.0
+    for k in range(DEGREE + 1):
+        second = second * u + first
+        first = first * u + value
+        value = value * u + coefficients[DEGREE - k]
+    return value, first, 2.0 * second
 
 
 def plain_ramp(step: float, steps: float) -> tuple[float, float, float]:
@@ -64,20 +80,5 @@ def plain_ramp(step: float, steps: float) -> tuple[float, float, float]:
     return value, slope, integral
 
 
-def plain_fading_slope(step: float, steps: float) -> tuple[float, float, float]:
-    """What a slope of 1 per step at the start adds to a `ramp`: value, slope and integral, in steps.
-
-    u - 6 u^3 + 8 u^4 - 3 u^5 has this slope at 0, and neither value, slope nor curvature at 1: a ramp
-    that begins during another one goes on with the acceleration that it finds.
-    """
-    if steps <= 0.0:
-        return 0.0, 0.0, 0.0
-    u = min(max(step / steps, 0.0), 1.0)
-    value = u * (1.0 - u) * (1.0 - u) * (1.0 - u) * (1.0 + 3.0 * u) * steps
-    slope = (1.0 - u) * (1.0 - u) * (1.0 + 2.0 * u - 15.0 * u * u)
-    integral = u * u * (0.5 - u * u * (1.5 - u * (1.6 - 0.5 * u))) * steps * steps
-    return value, slope, integral
-
-
 ramp = inlined(plain_ramp)
-fading_slope = inlined(plain_fading_slope)
+polynomial = inlined(plain_polynomial)

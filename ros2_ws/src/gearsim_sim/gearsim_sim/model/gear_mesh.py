@@ -11,12 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsim_sim.model.assembly import Assembly, Vector
+from gearsim_sim.model.contributions import ERROR, STIFFNESS, Contribution, MeshMod
 from gearsim_sim.model.periodic import PeriodicSeries
 from gearsim_sim.params.parallel import MeshStiffness
 
 INTERFACE = "mesh"
+Array = NDArray[np.float64]
+Mods = tuple[tuple[Contribution, float], ...]
 
 
 def mesh_direction(pinion_radius_m: float, gear_radius_m: float) -> Vector:
@@ -49,40 +53,73 @@ def stiffness_series(mesh: MeshStiffness, *, variation: bool) -> PeriodicSeries:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
-    """The mesh as a force element."""
+class MeshError:
+    """Transmission error [m] over the turn of a track; positive presses the teeth together."""
 
+    track: int
+    series: PeriodicSeries
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The mesh as a force element.
+
+    The tooth phase is `cycles` times the angle of `track`, plus `phase_offset`, in pitches.
+    """
+
+    name: str
+    interface: int
     stiffness: PeriodicSeries  # over tooth phase
     mean_stiffness_n_per_m: float
     damping_ns_per_m: float
-    pinion_error: PeriodicSeries  # over the pinion's turn
-    gear_error: PeriodicSeries  # over the gear's turn
-    pinion_teeth: int
+    track: int
+    cycles: float
+    phase_offset: float
+    errors: tuple[MeshError, ...]
 
-    def error(self, pinion_turns: float, gear_turns: float) -> float:
+    def stiffness_at(self, phases: Array, mods: Mods = ()) -> float:
+        """Stiffness [N/m] at these angles of the tracks, with what faults change."""
+        value = float(self.stiffness.value(phases[self.track] * self.cycles + self.phase_offset))
+        for mod, severity in mods:
+            if isinstance(mod, MeshMod) and mod.what == STIFFNESS:
+                value += severity * float(mod.series.value(phases[mod.track]))
+        return value
+
+    def error(self, phases: Array, mods: Mods = ()) -> float:
         """Transmission error [m]; positive presses the teeth together."""
-        return float(self.pinion_error.value(pinion_turns) + self.gear_error.value(gear_turns))
+        return sum(factor * float(one.series.value(phases[one.track])) for one, factor in self._all(mods))
 
-    def error_rate(
-        self, pinion_turns: float, gear_turns: float, pinion_speed_hz: float, gear_speed_hz: float
+    def error_rate(self, phases: Array, speeds_hz: Array, mods: Mods = ()) -> float:
+        """d(error)/dt [m/s]; `speeds_hz` are those of the tracks."""
+        return sum(
+            factor * float(speeds_hz[one.track] * one.series.slope(phases[one.track]))
+            for one, factor in self._all(mods)
+        )
+
+    def _all(self, mods: Mods) -> list[tuple[MeshError | MeshMod, float]]:
+        """Own errors and those of faults, with factors."""
+        added = [(mod, severity) for mod, severity in mods if isinstance(mod, MeshMod) and mod.what == ERROR]
+        return [*((one, 1.0) for one in self.errors), *added]
+
+    def energy(self, compression_m: float, phases: Array, mods: Mods = ()) -> float:
+        """Elastic energy k (d + e)^2 / 2 [J]; `compression_m` without the transmission error."""
+        total = compression_m + self.error(phases, mods)
+        return 0.5 * self.stiffness_at(phases, mods) * total**2
+
+    def force(
+        self, compression_m: float, rate_m_per_s: float, phases: Array, speeds_hz: Array, mods: Mods = ()
     ) -> float:
-        """d(error)/dt [m/s]."""
-        pinion = pinion_speed_hz * self.pinion_error.slope(pinion_turns)
-        return float(pinion + gear_speed_hz * self.gear_error.slope(gear_turns))
-
-    def energy(self, compression_m: float, pinion_turns: float) -> float:
-        """Elastic energy k d^2 / 2 [J]."""
-        return 0.5 * float(self.stiffness.value(pinion_turns * self.pinion_teeth)) * compression_m**2
-
-    def force(self, compression_m: float, rate_m_per_s: float, pinion_turns: float) -> float:
         """k d + c d' [N], the force that presses the teeth together.
 
         Parameters
         ----------
         compression_m, rate_m_per_s : float
-            Compression of the teeth with the error included, and its rate.
-        pinion_turns : float
-            Angle of the pinion.
+            Compression of the teeth without the transmission error, and its rate.
+        phases, speeds_hz : ndarray, shape (tracks,)
+            Turns of the tracks and their rates.
+        mods : tuple
+            Contributions of faults to this mesh, with their severities.
         """
-        stiffness = float(self.stiffness.value(pinion_turns * self.pinion_teeth))
-        return stiffness * compression_m + self.damping_ns_per_m * rate_m_per_s
+        total = compression_m + self.error(phases, mods)
+        rate = rate_m_per_s + self.error_rate(phases, speeds_hz, mods)
+        return self.stiffness_at(phases, mods) * total + self.damping_ns_per_m * rate

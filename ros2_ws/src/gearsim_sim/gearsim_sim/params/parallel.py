@@ -134,7 +134,7 @@ class ParallelModel(Strict):
 
 
 class ParallelParams(Strict):
-    """Everything that the models of 22 and 34 degrees of freedom need: `model` section, nameplate, switches."""
+    """What the models of 22 and 34 degrees of freedom need: `model` section, nameplate, switches."""
 
     where: str
     model: ParallelModel

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from gearsim_sim.model.ball_bearing import BallBearing
-from gearsim_sim.model.faults.spall import FaultKind, Spall, SpallParams
+from gearsim_sim.model.faults.kind import FaultKind, bearing_names
+from gearsim_sim.model.faults.spall import SpallParams, place_spall
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.spall import Spall
 
 
-def place(params: SpallParams, bearing_index: int, bearing: BallBearing) -> Spall:
+def place(params: SpallParams, component: str, plant: Plant, seed: int) -> tuple[Spall]:  # noqa: ARG001
     """The spall; `position_rad` is its azimuth at shaft angle zero (default 0)."""
-    return Spall(
-        bearing=bearing_index,
-        row=int(params.row) - 1,
-        on_inner_race=True,
-        position_rad=0.0 if params.position_rad is None else params.position_rad,
-        half_width_rad=params.width_m / (2 * bearing.inner_race_radius_m),
-        depth_m=params.depth_m,
-        race_radius_m=bearing.inner_race_radius_m,
-        ball_radius_m=bearing.ball_radius_m,
-        severity=1.0,
-    )
+    index = bearing_names(plant).index(component)
+    seat = plant.bearings[index]
+    position = 0.0 if params.position_rad is None else params.position_rad
+    return (place_spall(params, seat, index, position, inner=True),)
 
 
 KIND = FaultKind(
     name="inner_race_spall",
     summary="pit in the inner race, turning with the shaft (thesis 5.3.3)",
     params_model=SpallParams,
+    components=bearing_names,
     place=place,
 )

@@ -1,0 +1,144 @@
+"""The compiled time loop: any plant, one step after the other.
+
+Angles are measured in turns since an anchor that the engine renews regularly, so that no digit is lost in
+long runs; every quantity is a function of the integer step index, never of the split into calls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from gearsim_sim.integrate.compiled import compiled, inlined
+from gearsim_sim.integrate.kernel import correct, interface_motion, predict, site_accelerations, state_row
+from gearsim_sim.integrate.pieces import cosine_sine
+from gearsim_sim.model.bearing_loop import bearing_forces
+from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_motion
+from gearsim_sim.model.loop_data import Array, Data, Drive, Part
+from gearsim_sim.model.mesh_loop import mesh_forces
+
+# Columns of `motion` before the state rows of both parts: turns since the anchor, speed.
+MOTION_COLUMNS = 2
+
+
+@inlined
+def move_phases(drive: Drive, passed: float, phases: Array) -> None:
+    """Angles of all tracks in turns, within [0, 1)."""
+    for j in range(phases.size):
+        turns = drive.anchor_phases[j] + drive.rates[j] * passed
+        phases[j] = turns - math.floor(turns)
+
+
+@inlined
+def put_states(s: Array, part: Part, row: Array, at: int) -> int:
+    """State rows of a part into an output row; returns the place behind them."""
+    for j in range(part.state_rows.shape[0]):
+        row[at + j] = state_row(s, part.state_rows[j], part.length)
+    behind: int = at + part.state_rows.shape[0]
+    return behind
+
+
+@inlined
+def rotate_sites(phases: Array, data: Data, accel: Array, column: int) -> None:
+    """Turn pairs of rows (x, y) into the direction of sensors that rotate against the model's frame."""
+    for j in range(data.rotations.shape[0]):
+        row = int(data.rotations[j, 0])
+        turns = data.rotations[j, 2] * phases[int(data.rotations[j, 1])] + data.rotations[j, 3]
+        c, s = cosine_sine(turns, data.circle)
+        accel[row, column] = c * accel[row, column] + s * accel[row + 1, column]
+
+
+@cache
+def make_loop(
+    first_modes: int,
+    first_interfaces: int,
+    second_modes: int,
+    second_interfaces: int,
+    balls: int,
+    with_rates: bool,
+) -> Callable[..., int]:
+    """The compiled loop for parts of these (padded) numbers of modes and interfaces, and of balls.
+
+    The numbers of the second part may be 0. Rates of the interfaces cost time and are zero unless asked for.
+    """
+    n0, n1 = first_modes, second_modes
+    i0, i1 = first_interfaces, second_interfaces
+    rated = 1 if with_rates else 0
+    q0_count, q1_count = (1 + rated) * i0, (1 + rated) * i1
+
+    def run(
+        s0: Array, s1: Array, data: Data, drive: Drive, missing: Array, first: int, count: int,
+        accel: Array, column: int, motion: Array,
+    ) -> int:  # fmt: skip
+        """Advance from step `first` by `count` steps; returns the number of output samples passed.
+
+        accel (site rows, columns) gets `count` columns from `column` on. `motion` (samples,
+        MOTION_COLUMNS + state rows of both parts + interfaces) gets a row at each output sample.
+        """
+        q = np.zeros(i0 + i1)
+        rates = np.zeros(i0 + i1)
+        forces = np.zeros(i0 + i1)
+        known0 = np.zeros(data.first.site_index.size)
+        known1 = np.zeros(data.second.site_index.size)
+        inputs = np.zeros(data.first.left_known.shape[0])
+        phases = np.zeros(drive.rates.size)
+        touched = np.zeros((drive.spalls.shape[0], 2), dtype=np.int64)
+        work = np.zeros((data.meshes.index.shape[0], 3))
+        per_step = 1.0 / drive.length_steps
+        per_second = per_step / data.step_s
+        anchor, _, _ = reference_motion(drive.anchor_step, drive, per_step, per_second)
+        # The known inputs are worked out at each step, or at the first one only if they stay as they are.
+        changing = first + 1 if drive.steady == 1 else first + count
+        samples = 0
+        for i in range(count):
+            step = first + i + 1
+            turns, speed, change = reference_motion(step, drive, per_step, per_second)
+            passed = turns - anchor
+            move_phases(drive, passed, phases)
+            if step <= changing:
+                known_inputs(step, change, drive, data, inputs)
+                apply_known(inputs, data.first, s0, known0, n0)
+                apply_known(inputs, data.second, s1, known1, n1)
+            predict(s0, data.first.k, n0)
+            predict(s1, data.second.k, n1)
+            q0 = interface_motion(s0, data.first.k, data.first.length, n0, i0, q0_count)
+            q1 = interface_motion(s1, data.second.k, data.second.length, n1, i1, q1_count)
+            for j in range(i0):
+                q[j] = s0[q0 + j]
+            for j in range(i1):
+                q[i0 + j] = s1[q1 + j]
+            for j in range(rated * i0):
+                rates[j] = s0[q0 + i0 + j]
+            for j in range(rated * i1):
+                rates[i0 + j] = s1[q1 + i1 + j]
+            bearing_forces(
+                step, q, rates, phases, drive, data.bearings, data.circle, missing, touched, forces, balls
+            )
+            mesh_forces(step, q, rates, phases, speed, drive, data.meshes, work, forces)
+            correct(s0, data.first.k, forces, 0, n0, i0)
+            correct(s1, data.second.k, forces, i0, n1, i1)
+            for j in range(accel.shape[0]):
+                accel[j, column + i] = 0.0
+            site_accelerations(
+                s0, data.first.k, data.first.length, known0, data.first.site_index, accel, column + i, n0, i0
+            )
+            site_accelerations(
+                s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
+                n1, i1,
+            )  # fmt: skip
+            rotate_sites(phases, data, accel, column + i)
+            if step % data.oversampling == 0:
+                row = motion[samples]
+                row[0] = passed
+                row[1] = speed
+                at = put_states(s0, data.first, row, MOTION_COLUMNS)
+                at = put_states(s1, data.second, row, at)
+                for j in range(i0 + i1):
+                    row[at + j] = forces[j]
+                samples += 1
+        return samples
+
+    return compiled(run)

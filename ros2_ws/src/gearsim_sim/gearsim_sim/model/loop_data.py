@@ -1,0 +1,96 @@
+"""What the compiled loop is given: constants of a plant (`Data`), and what changes at events (`Drive`).
+
+The numbers of bearings, meshes, errors and rows of a table are run-time values, so that one compiled loop
+serves many machines and every fault; those of modes, interfaces and (padded) balls are constants of it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+# Each row of a table of `Drive` begins with the ramp of its severity: from, to, start step, steps.
+SEVERITY_COLUMNS = 4
+
+
+class Part(NamedTuple):
+    """Constants of one independent part of the linear system."""
+
+    k: Array  # `kernel.pack_constants`
+    length: int  # 2 nm, see `kernel.times_state`
+    left_known: Array  # (inputs, 2 nm) modal force per known input
+    site_known: Array  # (sites, inputs) acceleration per known input
+    site_index: Indices  # (sites,) output row that each site adds to
+    state_rows: Array  # (rows, 2 nm) outputs of the state at the output samples
+
+
+class Bearings(NamedTuple):
+    """Constants of all rolling bearings; balls are padded with cosine and sine zero."""
+
+    index: Indices  # (bearings, 3): interface in x, in y, track of the cage
+    numbers: Array  # (bearings, 3): load factor, clearance, nominal stiffness
+    cosines: Array  # (bearings, balls) of the azimuths in the cage's frame
+    sines: Array
+    row_offsets: Array  # (bearings, rows) azimuth of the first ball of each row in turns
+    balls_per_row: Indices  # (bearings,)
+
+
+class Meshes(NamedTuple):
+    """Constants of all gear meshes; tables as `PeriodicSeries.table` makes them, one behind the other."""
+
+    index: Indices  # (meshes, 6): interface, track, table's offset and points, its `errors` from, to
+    numbers: Array  # (meshes, 4): mean stiffness, damping, cycles per turn of the track, phase offset
+    errors: Indices  # (errors, 3): track, table's offset and points; those of a mesh are neighbours
+    tables: Array
+
+
+class Data(NamedTuple):
+    """Constants of the loop."""
+
+    first: Part
+    second: Part  # without modes and interfaces if the plant has one part only
+    bearings: Bearings
+    meshes: Meshes
+    circle: Array  # `pieces.cosine_sine`'s table
+    rotations: Array  # (rotating sites, 4): output row of x (y is the next), track, sense, offset in turns
+    inertia: float  # of the rigid rotation, at the reference shaft [kg m^2]
+    torque_ratios: Array  # (2,) `Plant.torque_ratios`
+    gravity: float
+    step_s: float
+    oversampling: int
+
+
+class Drive(NamedTuple):
+    """What changes at events.
+
+    Between events the angle of the reference shaft and the load are polynomials of
+    u = (step - start_step) / length_steps.
+    """
+
+    turns: Array  # DEGREE + 1 coefficients, ascending: turns of the reference shaft since start_step
+    load: Array  # DEGREE + 1 coefficients, ascending: load torque [N m]
+    start_step: int
+    length_steps: float
+    steady: int  # 1: speed and load are constant, so that the known inputs are
+    anchor_step: int
+    anchor_phases: Array  # (tracks,) turns in [0, 1) at the anchor
+    rates: Array  # (tracks,) turns per turn of the reference shaft
+    need_rates: int  # 1: some element wants the rates of the interfaces
+    spalls: Array
+    mesh_mods: Array
+    samples: Array
+
+
+# Own columns of each table of rows, behind those of the severity. `offset` and `points` are filled in for
+# contributions with samples: where these begin in `Drive.samples`, and how many intervals they have.
+COLUMNS = {
+    "spalls": (
+        "bearing", "row", "track", "sense", "on_inner_race", "position_turns", "half_width_rad", "depth_m",
+        "race_radius_m", "ball_radius_m",
+    ),
+    "mesh_mods": ("mesh", "what", "track", "offset", "points"),
+}  # fmt: skip

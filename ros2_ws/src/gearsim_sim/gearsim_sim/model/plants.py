@@ -1,0 +1,17 @@
+"""From parameters to a plant: one line for each kind of machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from gearsim_sim.model.parallel_shaft import make_parallel_shaft
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.params.parallel import ParallelParams
+
+MAKERS: dict[type, Callable[[Any, int], Plant]] = {ParallelParams: make_parallel_shaft}
+
+
+def make_plant(params: Any, seed: int) -> Plant:
+    """The machine with these parameters; `seed` gives the gears their random errors."""
+    return MAKERS[type(params)](params, seed)
