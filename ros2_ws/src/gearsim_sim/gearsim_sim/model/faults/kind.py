@@ -47,6 +47,8 @@ class FaultKind:
         Names of the plant's components that can have it.
     place : callable
         (parameters, component, plant, seed) -> contributions; raises InputError for what cannot be.
+    look_for : str
+        What an analyst sees of it in waveform, spectrum and envelope spectrum; the gallery prints it.
     """
 
     name: str
@@ -54,6 +56,7 @@ class FaultKind:
     params_model: type[BaseModel]
     components: Callable[[Plant], tuple[str, ...]]
     place: Callable[[Any, str, Plant, int], tuple[Contribution, ...]]
+    look_for: str = ""
 
     def build(self, spec: FaultSpec, plant: Plant, seed: int = 0) -> Fault:
         """The fault in place.
