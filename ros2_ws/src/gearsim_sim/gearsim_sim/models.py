@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from gearsim_sim.engine import Engine, EngineOutput
 from gearsim_sim.events import Event, FaultSpec
-from gearsim_sim.params import load_parallel_params
+from gearsim_sim.params import load_parallel_params, load_planetary_params
 
 if TYPE_CHECKING:
     from gearsim_sim.scenario import Scenario
@@ -55,6 +55,11 @@ def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> RunningModel:
     return _engine(scenario, params.model_copy(update={"pedestals": pedestals}))
 
 
+def _planetary(scenario: Scenario) -> RunningModel:
+    params = load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
+    return _engine(scenario, params)
+
+
 def _engine(scenario: Scenario, params: Any) -> RunningModel:
     return Engine(
         params,
@@ -70,4 +75,5 @@ def _engine(scenario: Scenario, params: Any) -> RunningModel:
 MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = {
     "lpm22": partial(_parallel_shaft, pedestals=False),
     "lpm34": partial(_parallel_shaft, pedestals=True),
+    "planetary18": _planetary,
 }

@@ -23,8 +23,10 @@ from __future__ import annotations
 import math
 
 from gearsim_sim.model.assembly import Assembly, LinearSystem, Vector
+from gearsim_sim.model.first_stage import add_first_stage
 from gearsim_sim.model.planet_geometry import RING, SIDES, SUN, StageGeometry
-from gearsim_sim.params.planetary import PlanetaryModel, PlanetaryParams, Support
+from gearsim_sim.model.plant import BASE_INPUTS
+from gearsim_sim.params.planetary import Casing, PlanetaryModel, PlanetaryParams, Support
 
 AXES = ("x", "y")
 MEMBERS = ("c", "r", "s")
@@ -61,11 +63,11 @@ def pin_vectors(geometry: StageGeometry, planet: int) -> tuple[Vector, Vector]:
 
 
 def rigid_vector(geometry: StageGeometry) -> Vector:
-    """Motion of everything for one radian of the carrier: Table 7.6, and the pins carried along."""
+    """Motion of the stage for one radian of the carrier: Table 7.6, and the pins carried along."""
     stage, radius = geometry.stage, geometry.carrier_radius_m
     speed = stage.member_ratios()
     scale = 1 / speed["carrier"]
-    rigid = {"theta_c": 1.0, "theta_s": speed["sun"] * scale}
+    rigid: dict[str, float] = {"theta_c": 1.0, "theta_s": speed["sun"] * scale}
     for i, angle in enumerate(stage.planet_angles_rad):
         rigid[f"x_p{i + 1}"] = -radius * math.sin(angle)
         rigid[f"y_p{i + 1}"] = radius * math.cos(angle)
@@ -87,6 +89,11 @@ def assemble(params: PlanetaryParams, geometry: StageGeometry) -> LinearSystem:
     model, planets = params.model, range(params.planets)
     assembly = Assembly()
     _add_bodies(assembly, model, params.planets)
+    if model.casing.included:
+        for axis in AXES:
+            assembly.inertia(f"{axis}_h", model.casing.mass_kg)
+    if params.first_mesh is not None:
+        add_first_stage(assembly, params)
     _add_supports(assembly, model)
     for side in (SUN, RING):
         stiffness = mean_stiffness(params, geometry, side)
@@ -117,7 +124,7 @@ def _add_bodies(assembly: Assembly, model: PlanetaryModel, planets: int) -> None
         assembly.inertia(f"theta_{name}", body.inertia_kg_m2)
 
 
-def _between(assembly: Assembly, first: str, second: str, support: Support) -> None:
+def _between(assembly: Assembly, first: str, second: str, support: Support | Casing) -> None:
     """The same spring and damper in x and y between two bodies; to the ground if `second` is empty."""
     for axis in AXES:
         vector = {f"{axis}_{first}": 1.0}
@@ -128,11 +135,19 @@ def _between(assembly: Assembly, first: str, second: str, support: Support) -> N
 
 
 def _add_supports(assembly: Assembly, model: PlanetaryModel) -> None:
-    """How carrier, sun and ring are held (7.33), (7.34), C.2."""
-    ring = model.ring_support
+    """How carrier, sun and ring are held (7.33), (7.34), C.2: by the ground, or by a casing.
+
+    With a casing the bearings of the sun's shaft join sun and casing besides; its feet hold the casing.
+    """
+    ring, casing = model.ring_support, model.casing
+    base = "h" if casing.included else ""
     _between(assembly, "c", "s", model.carrier_on_sun)
-    _between(assembly, "r", "", ring)
-    _between(assembly, "s", "", model.sun_support)
+    _between(assembly, "r", base, ring)
+    _between(assembly, "s", base, model.sun_support)
+    if casing.included:
+        _between(assembly, "h", "", casing)
+        shaft = Support(stiffness=casing.sun_stiffness_n_per_m, damping=casing.sun_damping_ns_per_m)
+        _between(assembly, "s", "h", shaft)
     assembly.spring({"theta_r": 1.0}, ring.torsional_stiffness_nm_per_rad)
     assembly.damper({"theta_r": 1.0}, ring.torsional_damping_nms_per_rad)
 
@@ -141,6 +156,7 @@ def _add_inputs(assembly: Assembly, params: PlanetaryParams) -> None:
     """Torques of motor and load, and no weight, which would turn in this frame (thesis has none)."""
     forward = params.stage.input_member == "carrier"
     motor, load = ("theta_c", "theta_s") if forward else ("theta_s", "theta_c")
-    assembly.known_input("motor_torque", {motor: 1.0})
-    assembly.known_input("load_torque", {load: -1.0})
-    assembly.known_input("gravity", {})
+    if params.first_mesh is not None:
+        motor = "theta_pin"
+    for name, column in zip(BASE_INPUTS, ({motor: 1.0}, {load: -1.0}, {}), strict=True):
+        assembly.known_input(name, column)

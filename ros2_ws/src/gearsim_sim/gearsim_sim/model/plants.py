@@ -6,10 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 from gearsim_sim.model.parallel_shaft import make_parallel_shaft
+from gearsim_sim.model.planet_plant import make_planetary
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.params.parallel import ParallelParams
+from gearsim_sim.params.planetary import PlanetaryParams
 
-MAKERS: dict[type, Callable[[Any, int], Plant]] = {ParallelParams: make_parallel_shaft}
+MAKERS: dict[type, Callable[[Any, int], Plant]] = {
+    ParallelParams: make_parallel_shaft,
+    PlanetaryParams: make_planetary,
+}
 
 
 def make_plant(params: Any, seed: int) -> Plant:

@@ -1,5 +1,6 @@
 """Parameters of the machines that can be simulated."""
 
 from gearsim_sim.params.parallel import ParallelParams, load_parallel_params
+from gearsim_sim.params.planetary import PlanetaryParams, load_planetary_params
 
-__all__ = ["ParallelParams", "load_parallel_params"]
+__all__ = ["ParallelParams", "PlanetaryParams", "load_parallel_params", "load_planetary_params"]

@@ -11,23 +11,31 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine, PlanetaryStage
 from gearsim_io.quantities import Si, validate
+from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
 from gearsim_sim.params.parallel import Drive
 
 MODEL_KIND = "planetary"
 
+
+def _on_or_off(value: float) -> bool:
+    if value not in (0.0, 1.0):
+        raise ValueError("0 or 1")
+    return value == 1.0
+
+
 Mass = Annotated[float, Si("kg", gt=0), Field(alias="mass")]
 Inertia = Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
 Stiffness = Annotated[float, Si("N/m", gt=0), Field(alias="stiffness")]
 Damping = Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
-Switch = Annotated[Count, Si("", ge=0, le=1)]
+Switch = Annotated[float, Si("", ge=0, le=1), AfterValidator(_on_or_off)]
 
 
 class Teeth(Strict):
@@ -70,6 +78,7 @@ class PlanetaryMesh(Strict):
     damping_ns_per_m: Damping
     pair_stiffness_n_per_m: Annotated[float, Si("N/m", ge=0), Field(alias="pair_stiffness")]
     pair_stiffness_ratio: Annotated[float, Si("", ge=1, le=2)]
+    potential_energy: Switch
     harmonics: Count
 
 
@@ -91,12 +100,10 @@ class PlanetPositions(Strict):
     error_m: Annotated[float, Si("m", ge=0), Field(alias="error")]
 
 
-class PlanetBearing(Strict):
+class PlanetBearing(RollingBearing):
     """Planet bearings as Hertz contacts instead of linear springs; the springs' dampers stay."""
 
     included: Switch
-    radial_clearance_m: Annotated[float, Si("m", ge=0), Field(alias="radial_clearance")]
-    nominal_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="nominal_stiffness")]
 
 
 class Casing(Strict):
