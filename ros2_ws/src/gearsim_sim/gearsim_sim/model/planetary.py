@@ -124,14 +124,14 @@ def _add_bodies(assembly: Assembly, model: PlanetaryModel, planets: int) -> None
         assembly.inertia(f"theta_{name}", body.inertia_kg_m2)
 
 
-def _between(assembly: Assembly, first: str, second: str, support: Support | Casing) -> None:
+def _between(assembly: Assembly, first: str, second: str, stiffness: float, damping: float) -> None:
     """The same spring and damper in x and y between two bodies; to the ground if `second` is empty."""
     for axis in AXES:
         vector = {f"{axis}_{first}": 1.0}
         if second:
             vector[f"{axis}_{second}"] = -1.0
-        assembly.spring(vector, support.stiffness_n_per_m)
-        assembly.damper(vector, support.damping_ns_per_m)
+        assembly.spring(vector, stiffness)
+        assembly.damper(vector, damping)
 
 
 def _add_supports(assembly: Assembly, model: PlanetaryModel) -> None:
@@ -139,15 +139,17 @@ def _add_supports(assembly: Assembly, model: PlanetaryModel) -> None:
 
     With a casing the bearings of the sun's shaft join sun and casing besides; its feet hold the casing.
     """
-    ring, casing = model.ring_support, model.casing
-    base = "h" if casing.included else ""
-    _between(assembly, "c", "s", model.carrier_on_sun)
-    _between(assembly, "r", base, ring)
-    _between(assembly, "s", base, model.sun_support)
+    casing, ring, base = model.casing, model.ring_support, "h" if model.casing.included else ""
+    held: list[tuple[str, str, Support | Casing]] = [
+        ("c", "s", model.carrier_on_sun),
+        ("r", base, ring),
+        ("s", base, model.sun_support),
+    ]
     if casing.included:
-        _between(assembly, "h", "", casing)
-        shaft = Support(stiffness=casing.sun_stiffness_n_per_m, damping=casing.sun_damping_ns_per_m)
-        _between(assembly, "s", "h", shaft)
+        held.append(("h", "", casing))
+        _between(assembly, "s", "h", casing.sun_stiffness_n_per_m, casing.sun_damping_ns_per_m)
+    for first, second, support in held:
+        _between(assembly, first, second, support.stiffness_n_per_m, support.damping_ns_per_m)
     assembly.spring({"theta_r": 1.0}, ring.torsional_stiffness_nm_per_rad)
     assembly.damper({"theta_r": 1.0}, ring.torsional_damping_nms_per_rad)
 
