@@ -306,7 +306,7 @@ def test_extremes_stay_finite(params, given, operating):
         (lambda p: Engine(p, 1, 0.0), "sample_rate_hz"),
         (lambda p: Engine(p, 1, float("nan")), "sample_rate_hz"),
         (lambda p: Engine(p, 1, RATE_HZ, 1), "oversampling"),
-        (lambda p: Engine(p, 1, RATE_HZ, 17), "oversampling"),
+        (lambda p: Engine(p, 1, RATE_HZ, 257), "oversampling"),
         (lambda p: Engine(p, 1, RATE_HZ, speed_hz=1e3), "speed_hz"),
         (lambda p: Engine(p, 1, RATE_HZ, speed_hz=float("nan")), "speed_hz"),
         (lambda p: Engine(p, 1, RATE_HZ, load_nm=-5.0), "load_nm"),

@@ -20,7 +20,7 @@ from gearsim_sim.schedule import REBASE_STEPS, ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Motion, Stepper
 from gearsim_sim.timeline import Timeline
 
-MIN_OVERSAMPLING, MAX_OVERSAMPLING = 2, 16
+MIN_OVERSAMPLING, MAX_OVERSAMPLING = 2, 256
 # Below this rate of integration the scheme loses accuracy; slow sample rates get more steps per sample.
 MIN_STEP_RATE_HZ = 131072.0
 MIN_RATE_HZ, MAX_RATE_HZ = 100.0, 1e6
@@ -78,7 +78,7 @@ class Engine:
     sample_rate_hz : float
         Rate of the output samples, 100 Hz to 1 MHz.
     oversampling : int
-        Integration steps per output sample, 2 to 16. Low sample rates get more steps by themselves.
+        Integration steps per output sample, 2 to 256. Low sample rates get more steps by themselves.
     faults : sequence of FaultSpec
         Present at full severity from the start.
     speed_hz, load_nm : float, optional
@@ -109,7 +109,7 @@ class Engine:
         sites: Sites | None = None,
         probes: Sequence[str] = (),
     ) -> None:
-        _check_numbers(seed, sample_rate_hz, oversampling)
+        check_numbers(seed, sample_rate_hz, oversampling)
         self.params = params
         self.sample_rate_hz = float(sample_rate_hz)
         self._steps = max(oversampling, math.ceil(MIN_STEP_RATE_HZ / sample_rate_hz))
@@ -118,9 +118,7 @@ class Engine:
         limits = self.plant.limits
         speed_hz = self._timeline.checked_speed(limits.speed_hz if speed_hz is None else speed_hz)
         load_nm = self._timeline.checked_load(limits.load_nm if load_nm is None else load_nm)
-        self._sites = _checked_sites(
-            self.plant.sites if sites is None else sites, self.plant.system.dof_names
-        )
+        self._sites = checked_sites(self.plant.sites if sites is None else sites, self.plant.system.dof_names)
         self._probes = tuple(probes)
         self._probe_names = probe_names(self.plant)
         for name in self._probes:
@@ -132,14 +130,10 @@ class Engine:
 
     def _prepare(self, speed_hz: float, load_nm: float, faults: Sequence[FaultSpec]) -> None:
         """Static equilibrium at the step where settling begins."""
-        step_s = 1.0 / (self.sample_rate_hz * self._steps)
-        first = -HALF_LENGTH_SAMPLES * self._steps - math.ceil(SETTLING_S / step_s)
-        turns = _START_TURNS + speed_hz * first * step_s
-        self._schedule = Schedule(self.plant, step_s, first, turns, speed_hz, load_nm)
-        for spec in faults:
-            fault = self._timeline.initial_fault(spec, first)
-            severity = Severity(fault.severity, fault.severity, first, 0.0)
-            self._schedule.faults[spec.name] = ActiveFault(fault, severity)
+        step_rate_hz = self.sample_rate_hz * self._steps
+        self._schedule = first_schedule(
+            self.plant, self._timeline, self._steps, step_rate_hz, speed_hz, load_nm, faults
+        )
         probed = bool(self._probes)
         self._stepper = Stepper(self.plant, self._schedule, self._sites, self._steps, probed=probed)
         self._taps = padded_taps(self._steps)
@@ -321,7 +315,28 @@ class Engine:
         return self._timeline.add(event, self.earliest_event_sample)
 
 
-def _check_numbers(seed: int, sample_rate_hz: float, oversampling: int) -> None:
+def first_schedule(
+    plant: Plant,
+    timeline: Timeline,
+    steps_per_sample: int,
+    step_rate_hz: float,
+    speed_hz: float,
+    load_nm: float,
+    faults: Sequence[FaultSpec],
+) -> Schedule:
+    """Operating point and faults from the step on where settling begins."""
+    step_s = 1.0 / step_rate_hz
+    first = -HALF_LENGTH_SAMPLES * steps_per_sample - math.ceil(SETTLING_S / step_s)
+    schedule = Schedule(plant, step_s, first, _START_TURNS + speed_hz * first * step_s, speed_hz, load_nm)
+    for spec in faults:
+        fault = timeline.initial_fault(spec, first)
+        severity = Severity(fault.severity, fault.severity, first, 0.0)
+        schedule.faults[spec.name] = ActiveFault(fault, severity)
+    return schedule
+
+
+def check_numbers(seed: int, sample_rate_hz: float, oversampling: int) -> None:
+    """InputError unless an engine can have these."""
     if seed < 0:
         raise InputError("engine", "seed", seed, ">= 0")
     if not MIN_RATE_HZ <= sample_rate_hz <= MAX_RATE_HZ:
@@ -332,7 +347,8 @@ def _check_numbers(seed: int, sample_rate_hz: float, oversampling: int) -> None:
         raise InputError("engine", "oversampling", oversampling, expected)
 
 
-def _checked_sites(sites: Sites, dofs: tuple[str, ...]) -> dict[str, Vector | RotatingSite]:
+def checked_sites(sites: Sites, dofs: tuple[str, ...]) -> dict[str, Vector | RotatingSite]:
+    """The sites, if these degrees of freedom make them up."""
     if not sites:
         raise InputError("engine", "sites", "none", "at least one site")
     for name, site in sites.items():

@@ -31,10 +31,20 @@ class PartSetup:
     """One independent part of the system, ready for the loop."""
 
     names: tuple[str, ...]
+    dofs: NDArray[np.int64]  # indices of its degrees of freedom in the whole system
     propagator: Propagator | None  # None: a part without degrees of freedom
     part: Part
     interfaces: NDArray[np.int64]  # indices of its interfaces in the whole system
     state_rows: NDArray[np.int64]  # indices of the state rows that it gives
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Static equilibrium under the load at the start."""
+
+    x: Array  # (dofs,) without the rigid rotation
+    forces: Array  # (interfaces,) beyond the linear part
+    inputs: Array  # (known inputs,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,10 +106,20 @@ class Stepper:
         self._loops = [make_loop(*sizes, shape[1], with_rates) for with_rates in (False, True)]
         self._missing = np.zeros(shape)
         self.row_count = len(vectors)
-        self._state = self._rest()
+        self._state = self._at_rest()
 
-    def _rest(self) -> tuple[Array, Array]:
-        """State of both parts at static equilibrium under the present load."""
+    @property
+    def parts(self) -> tuple[PartSetup, ...]:
+        """The parts of the system that have degrees of freedom."""
+        return tuple(part for part in self._parts if part.propagator is not None)
+
+    @property
+    def data(self) -> Data:
+        """Constants of the compiled loop."""
+        return self._data
+
+    def rest(self) -> Rest:
+        """Static equilibrium under the load at the present step, with the faults of that step."""
         plant, schedule = self._plant, self._schedule
         system = plant.system
         moment = Moment(
@@ -108,16 +128,20 @@ class Stepper:
         u = plant.known_inputs(schedule.segment.load_nm(self.step))
         rest = static_equilibrium(plant, complex_modes(system), moment, u)
         motion = system.interfaces.T @ rest
-        forces = plant.interface_forces(motion, np.zeros(motion.size), moment)
+        return Rest(rest, plant.interface_forces(motion, np.zeros(motion.size), moment), u)
+
+    def _at_rest(self) -> tuple[Array, Array]:
+        """State of both parts at static equilibrium."""
+        rest = self.rest()
         states = []
         for setup in self._parts:
             if setup.propagator is None:
                 states.append(np.zeros(0))
                 continue
-            own = rest[[system.dof(name) for name in setup.names]]
+            own = rest.x[setup.dofs]
             z = setup.propagator.modal(own, np.zeros_like(own))
-            known = u @ setup.propagator.left_known
-            states.append(pack_state(setup.propagator, z, known, forces[setup.interfaces]))
+            known = rest.inputs @ setup.propagator.left_known
+            states.append(pack_state(setup.propagator, z, known, rest.forces[setup.interfaces]))
         return states[0], states[1]
 
     def advance(self, count: int, accel: Array, column: int) -> Motion:
@@ -224,6 +248,7 @@ def set_up_part(
     ]
     return PartSetup(
         names=names,
+        dofs=np.array([system.dof(name) for name in names], dtype=np.int64),
         propagator=propagator,
         part=Part(
             k=pack_constants(propagator),
@@ -254,7 +279,7 @@ def _nothing(system: LinearSystem) -> PartSetup:
         site_index=empty,
         state_rows=np.zeros((0, 0)),
     )
-    return PartSetup(names=(), propagator=None, part=part, interfaces=empty, state_rows=empty)
+    return PartSetup(names=(), dofs=empty, propagator=None, part=part, interfaces=empty, state_rows=empty)
 
 
 def _loop_data(

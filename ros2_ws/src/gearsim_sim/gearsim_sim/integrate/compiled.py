@@ -28,7 +28,16 @@ _FOLDERS = ("integrate", "model")
 
 def compiled(function: Function) -> Function:
     """The function compiled, running without the interpreter's lock, cached on disk if possible."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": FAST, "error_model": "numpy"}
+    return _compiled(function, FAST)
+
+
+def compiled_exactly(function: Function) -> Function:
+    """The same, but for each operation being done as it is written and in that order."""
+    return _compiled(function, False)
+
+
+def _compiled(function: Function, fast: set[str] | bool) -> Function:
+    options: dict[str, Any] = {"nogil": True, "fastmath": fast, "error_model": "numpy"}
     folder = cache_folder()
     if folder is None:
         return cast(Function, numba.njit(**options)(function))
