@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gearsim_sim.integrate.pieces import DEGREE, plain_polynomial, plain_ramp
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults import Fault
-from gearsim_sim.model.loop_data import COLUMNS, SEVERITY_COLUMNS, Drive
+from gearsim_sim.model.loop_data import COLUMNS, NEED_RATES, SEVERITY_COLUMNS, Drive
 from gearsim_sim.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -210,7 +210,7 @@ class Schedule:
             anchor_step=self.anchor_step,
             anchor_phases=self.anchor_phases,
             rates=self._rates,
-            need_rates=0,
+            need_rates=int(any(np.any(tables[name][:, :2]) for name in NEED_RATES)),
             samples=samples,
             **tables,
         )

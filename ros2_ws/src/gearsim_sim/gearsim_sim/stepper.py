@@ -295,7 +295,7 @@ def _loop_data(
         first=parts[0].part,
         second=parts[1].part,
         bearings=bearing_data(plant, place),
-        meshes=mesh_data(plant, place),
+        meshes=mesh_data(plant, place, step_s),
         circle=circle_table(),
         rotations=rotations,
         inertia=plant.inertia_kg_m2,

@@ -3,7 +3,8 @@
 The compression of the teeth is d = r_p theta_p - r_g theta_g - y_p + y_g + e, and the force
 F = k(theta) d + c d' acts on the gears as -F times the gradient of d: moments -r_p F and +r_g F, forces
 +F on the pinion and -F on the gear along y. That is (4.18) and (4.19) with the errata: y instead of x,
-moment = radius times force, action = -reaction. The mesh has no contact loss (thesis 4.2.5).
+moment = radius times force, action = -reaction. The mesh has no contact loss (thesis 4.2.5) unless a fault
+gives it backlash or a lead error; then `tooth.contact.ToothContact` is its law.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from numpy.typing import NDArray
 
 from gearsim_sim.model.assembly import Assembly, Vector
 from gearsim_sim.model.contributions import ERROR, STIFFNESS, Contribution, MeshMod
+from gearsim_sim.model.mesh_terms import BACKLASH, LEAD_GAP, MeshPulse, MeshTerm, pulse_mean
 from gearsim_sim.model.periodic import PeriodicSeries
+from gearsim_sim.model.tooth.contact import ToothContact
 from gearsim_sim.params.parallel import MeshStiffness
 
 INTERFACE = "mesh"
@@ -64,7 +67,9 @@ class MeshError:
 class Mesh:
     """The mesh as a force element.
 
-    The tooth phase is `cycles` times the angle of `track`, plus `phase_offset`, in pitches.
+    The tooth phase is `cycles` times the angle of `track`, plus `phase_offset`, in pitches. `pulse` is a
+    rectangular part of the stiffness: start and width in pitches, height [N/m]; the loop takes its exact
+    mean over each step, here it jumps.
     """
 
     name: str
@@ -76,21 +81,28 @@ class Mesh:
     cycles: float
     phase_offset: float
     errors: tuple[MeshError, ...]
+    pulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def stiffness_at(self, phases: Array, mods: Mods = ()) -> float:
         """Stiffness [N/m] at these angles of the tracks, with what faults change."""
-        value = float(self.stiffness.value(phases[self.track] * self.cycles + self.phase_offset))
+        place = phases[self.track] * self.cycles + self.phase_offset
+        value = float(self.stiffness.value(place))
+        value += self.pulse[2] * pulse_mean(place - self.pulse[0], 0.0, self.pulse[1])
         for mod, severity in mods:
+            if isinstance(mod, MeshPulse) and mod.what == STIFFNESS:
+                value += severity * mod.mean(phases[mod.track], 0.0)
             if isinstance(mod, MeshMod) and mod.what == STIFFNESS:
                 value += severity * float(mod.series.value(phases[mod.track]))
         return value
 
     def error(self, phases: Array, mods: Mods = ()) -> float:
         """Transmission error [m]; positive presses the teeth together."""
-        return sum(factor * float(one.series.value(phases[one.track])) for one, factor in self._all(mods))
+        smooth = sum(factor * float(one.series.value(phases[one.track])) for one, factor in self._all(mods))
+        pulses = [(mod, factor) for mod, factor in mods if isinstance(mod, MeshPulse) and mod.what == ERROR]
+        return smooth + sum(factor * mod.mean(phases[mod.track], 0.0) for mod, factor in pulses)
 
     def error_rate(self, phases: Array, speeds_hz: Array, mods: Mods = ()) -> float:
-        """d(error)/dt [m/s]; `speeds_hz` are those of the tracks."""
+        """d(error)/dt [m/s]; `speeds_hz` are those of the tracks. Pulses have none but at their jumps."""
         return sum(
             factor * float(speeds_hz[one.track] * one.series.slope(phases[one.track]))
             for one, factor in self._all(mods)
@@ -101,15 +113,28 @@ class Mesh:
         added = [(mod, severity) for mod, severity in mods if isinstance(mod, MeshMod) and mod.what == ERROR]
         return [*((one, 1.0) for one in self.errors), *added]
 
+    def contact(self, mods: Mods = ()) -> ToothContact:
+        """The law of contact, with what faults add to it."""
+        numbers = [0.0, 0.0]
+        for mod, severity in mods:
+            if isinstance(mod, MeshTerm):
+                numbers[mod.what] += severity * mod.value_m
+        return ToothContact(backlash_m=numbers[BACKLASH], lead_gap_m=numbers[LEAD_GAP])
+
     def energy(self, compression_m: float, phases: Array, mods: Mods = ()) -> float:
-        """Elastic energy k (d + e)^2 / 2 [J]; `compression_m` without the transmission error."""
+        """Elastic energy [J], k (d + e)^2 / 2 where nothing parts; `compression_m` is d."""
         total = compression_m + self.error(phases, mods)
-        return 0.5 * self.stiffness_at(phases, mods) * total**2
+        return self.stiffness_at(phases, mods) * self.contact(mods).energy(total)
+
+    def tangent(self, compression_m: float, phases: Array, mods: Mods = ()) -> float:
+        """Slope of the elastic force [N/m]."""
+        total = compression_m + self.error(phases, mods)
+        return self.stiffness_at(phases, mods) * self.contact(mods).slope(total)
 
     def force(
         self, compression_m: float, rate_m_per_s: float, phases: Array, speeds_hz: Array, mods: Mods = ()
     ) -> float:
-        """k d + c d' [N], the force that presses the teeth together.
+        """Force that presses the teeth together [N]: k d + c d' where nothing parts.
 
         Parameters
         ----------
@@ -122,4 +147,7 @@ class Mesh:
         """
         total = compression_m + self.error(phases, mods)
         rate = rate_m_per_s + self.error_rate(phases, speeds_hz, mods)
-        return self.stiffness_at(phases, mods) * total + self.damping_ns_per_m * rate
+        stiffness, law = self.stiffness_at(phases, mods), self.contact(mods)
+        if law.bilateral:
+            return stiffness * total + self.damping_ns_per_m * rate
+        return law.force(total, rate, stiffness, self.damping_ns_per_m)

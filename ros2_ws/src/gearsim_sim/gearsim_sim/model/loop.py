@@ -18,7 +18,7 @@ from gearsim_sim.integrate.pieces import cosine_sine
 from gearsim_sim.model.bearing_loop import bearing_forces
 from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_motion
 from gearsim_sim.model.loop_data import Array, Data, Drive, Part
-from gearsim_sim.model.mesh_loop import mesh_forces
+from gearsim_sim.model.mesh_loop import WORK_COLUMNS, mesh_forces
 
 # Columns of `motion` before the state rows of both parts: turns since the anchor, speed.
 MOTION_COLUMNS = 2
@@ -86,7 +86,7 @@ def make_loop(
         inputs = np.zeros(data.first.left_known.shape[0])
         phases = np.zeros(drive.rates.size)
         touched = np.zeros((drive.spalls.shape[0], 2), dtype=np.int64)
-        work = np.zeros((data.meshes.index.shape[0], 3))
+        work = np.zeros((data.meshes.index.shape[0], WORK_COLUMNS))
         per_step = 1.0 / drive.length_steps
         per_second = per_step / data.step_s
         anchor, _, _ = reference_motion(drive.anchor_step, drive, per_step, per_second)

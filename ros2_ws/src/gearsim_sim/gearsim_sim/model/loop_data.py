@@ -40,12 +40,17 @@ class Bearings(NamedTuple):
 
 
 class Meshes(NamedTuple):
-    """Constants of all gear meshes; tables as `PeriodicSeries.table` makes them, one behind the other."""
+    """Constants of all gear meshes; tables as `PeriodicSeries.table` makes them, one behind the other.
+
+    A mesh may have a rectangular pulse of stiffness once per tooth phase; its height is 0 if not.
+    """
 
     index: Indices  # (meshes, 6): interface, track, table's offset and points, its `errors` from, to
-    numbers: Array  # (meshes, 4): mean stiffness, damping, cycles per turn of the track, phase offset
+    numbers: Array  # (meshes, 7): mean stiffness, damping, cycles per turn of the track, phase offset,
+    # and the pulse: start and width in pitches, height
     errors: Indices  # (errors, 3): track, table's offset and points; those of a mesh are neighbours
     tables: Array
+    step_s: float
 
 
 class Data(NamedTuple):
@@ -82,6 +87,8 @@ class Drive(NamedTuple):
     need_rates: int  # 1: some element wants the rates of the interfaces
     spalls: Array
     mesh_mods: Array
+    mesh_pulses: Array
+    mesh_terms: Array
     samples: Array
 
 
@@ -93,4 +100,8 @@ COLUMNS = {
         "race_radius_m", "ball_radius_m",
     ),
     "mesh_mods": ("mesh", "what", "track", "offset", "points"),
+    "mesh_pulses": ("mesh", "what", "track", "start_turns", "width_turns", "height"),
+    "mesh_terms": ("mesh", "what", "value_m"),
 }  # fmt: skip
+# Tables whose rows need the rates of the interfaces, unless their severity is zero.
+NEED_RATES = ("mesh_terms",)

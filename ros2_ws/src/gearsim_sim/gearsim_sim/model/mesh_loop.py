@@ -2,29 +2,36 @@
 
 from __future__ import annotations
 
+import math
+
 from gearsim_sim.integrate.compiled import inlined
 from gearsim_sim.integrate.pieces import table_value
 from gearsim_sim.model.bearing_loop import severity
 from gearsim_sim.model.loop_data import Array, Drive, Meshes
 
 _OWN = 4  # first column behind those of the severity
+# Columns of `work`: stiffness, transmission error, its rate per turn and second, backlash, lead gap.
+WORK_COLUMNS = 5
 
 
 @inlined
 def mesh_forces(
-    step: int, q: Array, rates: Array, phases: Array, speed_hz: float, drive: Drive, meshes: Meshes,  # noqa: ARG001
+    step: int, q: Array, rates: Array, phases: Array, speed_hz: float, drive: Drive, meshes: Meshes,
     work: Array, forces: Array,
 ) -> None:  # fmt: skip
     """Forces of the meshes beyond their linear part: variation of stiffness, and transmission error.
 
-    `rates` of the interfaces are zero unless `drive.need_rates`; `work` (meshes, 3) takes
-    stiffness, error and rate of the error.
+    `rates` of the interfaces are zero unless `drive.need_rates`; `work` is (meshes, WORK_COLUMNS).
     """
     count = meshes.index.shape[0]
     for i in range(count):
         track = meshes.index[i, 1]
         turns = phases[track] * meshes.numbers[i, 2] + meshes.numbers[i, 3]
         work[i, 0], _ = table_value(turns, meshes.tables, meshes.index[i, 2], meshes.index[i, 3])
+        if meshes.numbers[i, 6] != 0.0:
+            length = abs(speed_hz * drive.rates[track] * meshes.numbers[i, 2]) * meshes.step_s
+            mean = pulse_mean(turns - meshes.numbers[i, 4], length, meshes.numbers[i, 5])
+            work[i, 0] += meshes.numbers[i, 6] * mean
         error = 0.0
         rate = 0.0
         for j in range(meshes.index[i, 4], meshes.index[i, 5]):
@@ -34,17 +41,29 @@ def mesh_forces(
             rate += drive.rates[track] * slope
         work[i, 1] = error
         work[i, 2] = rate
+        work[i, 3] = 0.0
+        work[i, 4] = 0.0
     add_mods(step, phases, drive, work)
+    add_pulses(step, phases, speed_hz, drive, meshes, work)
+    add_terms(step, drive, work)
     for i in range(count):
         at = meshes.index[i, 0]
         stiffness = work[i, 0]
-        damper = meshes.numbers[i, 1] * (speed_hz * work[i, 2])
-        forces[at] = -((stiffness - meshes.numbers[i, 0]) * q[at] + stiffness * work[i, 1] + damper)
+        slack = work[i, 3] + work[i, 4]
+        if slack == 0.0:
+            damper = meshes.numbers[i, 1] * (speed_hz * work[i, 2])
+            forces[at] = -((stiffness - meshes.numbers[i, 0]) * q[at] + stiffness * work[i, 1] + damper)
+        else:
+            linear = meshes.numbers[i, 0] * q[at] + meshes.numbers[i, 1] * rates[at]
+            rate = rates[at] + speed_hz * work[i, 2]
+            forces[at] = linear - tooth_force(
+                q[at] + work[i, 1], rate, stiffness, meshes.numbers[i, 1], work[i, 3], work[i, 4]
+            )
 
 
 @inlined
 def add_mods(step: int, phases: Array, drive: Drive, work: Array) -> None:
-    """What faults change of stiffness and transmission error."""
+    """What faults change of stiffness and transmission error, smoothly."""
     for j in range(drive.mesh_mods.shape[0]):
         row = drive.mesh_mods[j]
         mesh, track = int(row[_OWN]), int(row[_OWN + 2])
@@ -55,3 +74,66 @@ def add_mods(step: int, phases: Array, drive: Drive, work: Array) -> None:
         else:
             work[mesh, 1] += now * value
             work[mesh, 2] += now * drive.rates[track] * slope
+
+
+@inlined
+def pulse_area(place: float, width: float) -> float:
+    """Integral from 0 to `place` of a function that is 1 from 0 to `width` in each period of 1."""
+    whole = math.floor(place)
+    area: float = whole * width + min(place - whole, width)
+    return area
+
+
+@inlined
+def pulse_mean(place: float, length: float, width: float) -> float:
+    """Mean of that function over `length` around `place`: its jumps become ramps of one step."""
+    if length < 1e-12:
+        return 1.0 if place - math.floor(place) < width else 0.0
+    mean: float = (pulse_area(place + 0.5 * length, width) - pulse_area(place - 0.5 * length, width)) / length
+    return mean
+
+
+@inlined
+def add_pulses(step: int, phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
+    """Rectangular changes by faults: their exact mean over one step, and that of their rate."""
+    for j in range(drive.mesh_pulses.shape[0]):
+        row = drive.mesh_pulses[j]
+        mesh, track = int(row[_OWN]), int(row[_OWN + 2])
+        height = severity(row, step) * row[_OWN + 5]
+        place, width = phases[track] - row[_OWN + 3], row[_OWN + 4]
+        length = abs(speed_hz * drive.rates[track]) * meshes.step_s
+        value = height * pulse_mean(place, length, width)
+        if row[_OWN + 1] == 0.0:
+            work[mesh, 0] += value
+        else:
+            work[mesh, 1] += value
+            if length >= 1e-12:
+                after = pulse_mean(place + 0.5 * length, 0.0, width)
+                before = pulse_mean(place - 0.5 * length, 0.0, width)
+                work[mesh, 2] += height * drive.rates[track] * (after - before) / length
+
+
+@inlined
+def add_terms(step: int, drive: Drive, work: Array) -> None:
+    """What faults add to backlash and lead gap."""
+    for j in range(drive.mesh_terms.shape[0]):
+        row = drive.mesh_terms[j]
+        work[int(row[_OWN]), 3 + int(row[_OWN + 1])] += severity(row, step) * row[_OWN + 2]
+
+
+@inlined
+def tooth_force(
+    d: float, rate: float, stiffness: float, damping: float, backlash: float, gap: float
+) -> float:
+    """Force of teeth that can part; the readable twin is `tooth.contact.ToothContact.force`."""
+    sense = 1.0 if d > 0.0 else -1.0
+    depth = d if d > 0.0 else -d - backlash
+    if depth <= 0.0:
+        return 0.0
+    touching = 1.0
+    elastic = stiffness * (depth - 0.5 * gap)
+    if depth < gap:
+        touching = depth / gap
+        elastic = stiffness * 0.5 * depth * touching
+    damper = damping * touching * sense * rate
+    return sense * (elastic + max(-elastic, min(elastic, damper)))

@@ -19,6 +19,7 @@ from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.gear_mesh import Mesh
+from gearsim_sim.model.gear_wheel import GearWheel
 
 Array = NDArray[np.float64]
 # The known inputs that every plant has first, in this order.
@@ -100,6 +101,8 @@ class Plant:
         Places of accelerometers.
     signals : mapping
         Further outputs that are the state itself, such as torques.
+    wheels : tuple of GearWheel
+        Gear wheels whose teeth are known, each in each of its meshes.
     """
 
     name: str
@@ -114,6 +117,7 @@ class Plant:
     limits: Limits
     gravity_m_per_s2: float
     signals: Mapping[str, StateRow] = field(default_factory=dict)
+    wheels: tuple[GearWheel, ...] = ()
     faults_on: bool = True
 
     @cached_property
@@ -194,7 +198,7 @@ class Plant:
             own = seat.stiffness(q[pair], phases, self._of(moment, "bearing", index))
             tangent[np.ix_(pair, pair)] = own - seat.nominal_stiffness_n_per_m * np.eye(2)
         for index, mesh in enumerate(self.meshes):
-            stiffness = mesh.stiffness_at(phases, self._of(moment, "mesh", index))
+            stiffness = mesh.tangent(q[mesh.interface], phases, self._of(moment, "mesh", index))
             tangent[mesh.interface, mesh.interface] = stiffness - mesh.mean_stiffness_n_per_m
         still = Moment(moment.turns, 0.0, moment.faults)
         return -self.interface_forces(q, np.zeros_like(q), still), tangent

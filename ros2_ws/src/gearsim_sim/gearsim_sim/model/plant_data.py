@@ -35,7 +35,7 @@ def bearing_data(plant: Plant, place: NDArray[np.int64]) -> Bearings:
     )
 
 
-def mesh_data(plant: Plant, place: NDArray[np.int64]) -> Meshes:
+def mesh_data(plant: Plant, place: NDArray[np.int64], step_s: float) -> Meshes:
     """All meshes; a series that several share is tabled once."""
     store = _Tables()
     index, errors = [], []
@@ -45,14 +45,15 @@ def mesh_data(plant: Plant, place: NDArray[np.int64]) -> Meshes:
         own = [place[mesh.interface], mesh.track, *store.put(mesh.stiffness), first, len(errors)]
         index.append(own)
     numbers = [
-        [mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m, mesh.cycles, mesh.phase_offset]
+        [mesh.mean_stiffness_n_per_m, mesh.damping_ns_per_m, mesh.cycles, mesh.phase_offset, *mesh.pulse]
         for mesh in plant.meshes
     ]
     return Meshes(
         index=np.array(index, dtype=np.int64).reshape(-1, 6),
-        numbers=np.array(numbers, dtype=np.float64).reshape(-1, 4),
+        numbers=np.array(numbers, dtype=np.float64).reshape(-1, 7),
         errors=np.array(errors, dtype=np.int64).reshape(-1, 3),
         tables=store.all(),
+        step_s=step_s,
     )
 
 

@@ -31,6 +31,11 @@ class ToothContact:
     backlash_m: float = 0.0
     lead_gap_m: float = 0.0
 
+    @property
+    def bilateral(self) -> bool:
+        """Whether nothing ever parts: a mesh without these faults, whose spring and damper also pull."""
+        return self.backlash_m == 0 and self.lead_gap_m == 0
+
     def elastic(self, compression_m: float) -> float:
         """Elastic force over the mesh stiffness [m]: positive on the drive flanks, negative on the back."""
         if compression_m > 0:
@@ -46,6 +51,13 @@ class ToothContact:
         if depth < gap:
             return depth**3 / (6 * gap)
         return depth**2 / 2 - gap * depth / 2 + gap**2 / 6
+
+    def slope(self, compression_m: float) -> float:
+        """Derivative of `elastic`, 0 to 1; at touch that of the side that is pressed."""
+        depth = compression_m if compression_m >= 0 else -compression_m - self.backlash_m
+        if depth < 0:
+            return 0.0
+        return 1.0 if depth >= self.lead_gap_m else depth / self.lead_gap_m
 
     def touching(self, compression_m: float) -> float:
         """Part of the face that is in contact, 0 to 1."""

@@ -1,0 +1,58 @@
+"""Geometry and material of the teeth of a spur pair, from the `teeth` section of a model."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from gearsim_io.quantities import Si
+from gearsim_sim.model.tooth.gear import SpurGear
+from gearsim_sim.model.tooth.pair import GearPair
+from gearsim_sim.params.fields import Strict
+
+
+class Teeth(Strict):
+    """What the nameplate does not tell of two spur gears in mesh.
+
+    Addendum, dedendum, fillet and shifts are over the module. The bores hold the wheels' bodies.
+    """
+
+    module_m: Annotated[float, Si("m", gt=0), Field(alias="module")]
+    pressure_angle_rad: Annotated[float, Si("rad", gt=0, lt=math.pi / 4), Field(alias="pressure_angle")]
+    addendum: Annotated[float, Si("", gt=0, le=1.5)]
+    dedendum: Annotated[float, Si("", gt=0, le=2)]
+    fillet: Annotated[float, Si("", ge=0, lt=1)]
+    face_width_m: Annotated[float, Si("m", gt=0), Field(alias="face_width")]
+    pinion_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="pinion_bore_radius")]
+    gear_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="gear_bore_radius")]
+    youngs_modulus_pa: Annotated[float, Si("Pa", gt=0), Field(alias="youngs_modulus")]
+    poisson_ratio: Annotated[float, Si("", ge=0, lt=0.5)]
+    pinion_shift: Annotated[float, Si("", ge=-1, le=1.5)] = 0.0
+    gear_shift: Annotated[float, Si("", ge=-1, le=1.5)] = 0.0
+
+    def pair(self, pinion_teeth: int, gear_teeth: int) -> GearPair:
+        """The gears in mesh; InputError if there are no such gears."""
+        bores = (self.pinion_bore_radius_m, self.gear_bore_radius_m)
+        shifts = (self.pinion_shift, self.gear_shift)
+        gears = [
+            SpurGear(
+                teeth=teeth,
+                module_m=self.module_m,
+                face_width_m=self.face_width_m,
+                hub_radius_m=bore,
+                pressure_angle_rad=self.pressure_angle_rad,
+                addendum=self.addendum,
+                dedendum=self.dedendum,
+                fillet=self.fillet,
+                profile_shift=shift,
+                youngs_modulus_pa=self.youngs_modulus_pa,
+                poisson_ratio=self.poisson_ratio,
+                name=name,
+            )
+            for name, teeth, bore, shift in zip(
+                ("pinion", "gear"), (pinion_teeth, gear_teeth), bores, shifts, strict=True
+            )
+        ]
+        return GearPair(*gears)
