@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 from gearsim_sim.model.assembly import LinearSystem, Vector
-from gearsim_sim.model.ball_bearing import BallBearing, make_ball_bearing
 from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.first_stage import INTERFACE, first_stage_contact_ratio, first_stage_rigid, teeth_of
 from gearsim_sim.model.gear_mesh import Mesh, MeshError
@@ -20,6 +19,7 @@ from gearsim_sim.model.planet_meshes import make_meshes, two_pair_stiffness, whe
 from gearsim_sim.model.planetary import assemble, rigid_vector
 from gearsim_sim.model.plant import Limits, Plant, RotatingSite, Track
 from gearsim_sim.model.ring import Ring
+from gearsim_sim.model.rolling_bearing import RollingBearing, make_rolling_bearing
 from gearsim_sim.params.planetary import PlanetaryParams
 
 # Numbers of the first stage's wheels in the random streams, behind those of any planets.
@@ -76,7 +76,7 @@ def make_planetary(params: PlanetaryParams, seed: int) -> PlanetaryPlant:
     )
 
 
-def _tracks(params: PlanetaryParams, laws: tuple[BallBearing, ...]) -> tuple[Track, ...]:
+def _tracks(params: PlanetaryParams, laws: tuple[RollingBearing, ...]) -> tuple[Track, ...]:
     """Shafts in space, then angles against the carrier that count forward, then cages and planets, signed."""
     stage, speed = params.stage, params.stage.member_ratios()
     carrier = speed["carrier"]
@@ -94,7 +94,9 @@ def _tracks(params: PlanetaryParams, laws: tuple[BallBearing, ...]) -> tuple[Tra
     if laws:
         tracks.append(Track("planet counter-clockwise", spin))
     for i, law in enumerate(laws):
-        tracks.append(Track(f"planet_{i + 1}_bearing cage", law.cage_rate(0.0, spin)))
+        name = params.bearings[i].name
+        tracks.append(Track(f"{name} cage", law.cage_rate(0.0, spin)))
+        tracks.append(Track(f"{name} spin", law.spin_rate(0.0, spin)))
     return tuple(tracks)
 
 
@@ -122,11 +124,11 @@ def _first_mesh(params: PlanetaryParams, system: LinearSystem, seed: int, index:
     )
 
 
-def _bearing_laws(params: PlanetaryParams) -> tuple[BallBearing, ...]:
+def _bearing_laws(params: PlanetaryParams) -> tuple[RollingBearing, ...]:
     """The pin drives its planet along the circle of the pins, forward if the carrier is the input."""
     ahead = math.pi / 2 if params.stage.input_member == "carrier" else -math.pi / 2
     return tuple(
-        make_ball_bearing(
+        make_rolling_bearing(
             plate,
             params.model.planet_bearing,
             load_direction_rad=angle + ahead,
@@ -139,9 +141,9 @@ def _bearing_laws(params: PlanetaryParams) -> tuple[BallBearing, ...]:
 
 
 def _seat(
-    params: PlanetaryParams, system: LinearSystem, planet: int, law: BallBearing, index: dict[str, int]
+    params: PlanetaryParams, system: LinearSystem, planet: int, law: RollingBearing, index: dict[str, int]
 ) -> BearingSeat:
-    """The inner ring is the carrier's pin, which stands in this plane; the outer one turns with the planet."""
+    """The inner ring is the carrier's pin and stands in this plane, the outer one turns with the planet."""
     name = params.bearings[planet].name
     return BearingSeat(
         name=name,
@@ -149,6 +151,7 @@ def _seat(
         x=system.interface_names.index(f"{name}_x"),
         y=system.interface_names.index(f"{name}_y"),
         cage=index[f"{name} cage"],
+        spin=index[f"{name} spin"],
         inner=Ring(),
         outer=Ring(index["planet counter-clockwise"], 1.0),
         nominal_stiffness_n_per_m=params.model.planet_bearing.nominal_stiffness_n_per_m,

@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 from gearsim_io.errors import InputError
-from gearsim_sim.model.faults import inner_race_spall, outer_race_spall
+from gearsim_sim.model.faults import (
+    inner_race_spall,
+    outer_race_spall,
+    planet_position_error,
+    planet_tooth_crack,
+    planet_tooth_spall,
+    unequal_load_sharing,
+)
 from gearsim_sim.model.faults.kind import Fault, FaultKind
 
-REGISTRY: dict[str, FaultKind] = {kind.name: kind for kind in (outer_race_spall.KIND, inner_race_spall.KIND)}
+_KINDS = (
+    outer_race_spall.KIND,
+    inner_race_spall.KIND,
+    planet_tooth_crack.KIND,
+    planet_tooth_spall.KIND,
+    planet_position_error.KIND,
+    unequal_load_sharing.KIND,
+)
+REGISTRY: dict[str, FaultKind] = {kind.name: kind for kind in _KINDS}
 
 __all__ = ["REGISTRY", "Fault", "FaultKind", "fault_kind"]
 
