@@ -34,6 +34,7 @@ COMMANDS = {
     "diagnose": "diagnose",
     "view": "view",
     "bench": "bench",
+    "gallery": "gallery",
     "data": "data",
 }
 # Done by the entry script before this program starts; listed here so that --help is complete.

@@ -1,0 +1,1 @@
+"""The gallery: one picture for every kind of fault, healthy beside faulty."""

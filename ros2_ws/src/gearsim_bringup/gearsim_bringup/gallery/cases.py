@@ -1,0 +1,66 @@
+"""What the gallery shows: for every kind of fault the shipped scenario that has it, with and without it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from gearsim_io.errors import InputError
+from gearsim_sim.events import FaultSpec, Inject
+from gearsim_sim.model.faults import REGISTRY
+from gearsim_sim.scenario import Scenario, load_scenario, scenario_names
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of fault, and two scenarios that differ by nothing else."""
+
+    kind: str
+    example: str  # name of the shipped scenario
+    faulty: Scenario  # the fault is there from the start
+    healthy: Scenario
+    component: str
+
+
+def cases(only: tuple[str, ...] = ()) -> list[Case]:
+    """One case for each kind, in the order of the registry.
+
+    Parameters
+    ----------
+    only : tuple of str
+        Kinds to show; all if empty.
+
+    Raises
+    ------
+    InputError
+        An unknown kind, or a kind that no shipped scenario shows.
+    """
+    for kind in only:
+        if kind not in REGISTRY:
+            raise InputError("gallery", "only", kind, "some of " + ", ".join(REGISTRY))
+    scenarios = [load_scenario(name) for name in scenario_names()]
+    return [_case(kind, scenarios) for kind in only or REGISTRY]
+
+
+def faults_of(scenario: Scenario) -> list[FaultSpec]:
+    """All faults that a scenario brings, from the start or later."""
+    injected = [event.fault for event in scenario.events if isinstance(event, Inject)]
+    return [*scenario.faults, *injected]
+
+
+def _case(kind: str, scenarios: list[Scenario]) -> Case:
+    showing = [one for one in scenarios if any(fault.kind == kind for fault in faults_of(one))]
+    if not showing:
+        raise InputError("gallery", "only", kind, "a kind that a shipped scenario shows")
+    # The scenario named after the kind, else the one with the fewest other faults.
+    example = min(showing, key=lambda one: (one.name != kind, len(faults_of(one)), one.name))
+    mine = [fault for fault in faults_of(example) if fault.kind == kind]
+    others = tuple(fault for fault in example.faults if fault.kind != kind)
+    quiet = example.with_events([])
+    return Case(
+        kind=kind,
+        example=example.name,
+        faulty=dataclasses.replace(quiet, faults=(*others, *mine)),
+        healthy=dataclasses.replace(quiet, faults=others),
+        component=mine[0].component,
+    )

@@ -1,0 +1,77 @@
+"""The page of the gallery: a section for every kind, with its picture."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from gearsim_bringup.gallery.analysis import Comparison, compare
+from gearsim_bringup.gallery.cases import Case, cases
+from gearsim_bringup.gallery.picture import draw
+from gearsim_sim.model.faults import REGISTRY
+
+PAGE = "README.md"
+_HEAD = """# Gallery
+
+One picture for every kind of fault that can be injected: the channel that shows it best, healthy in grey and with
+the fault in red; nothing else differs. Made by `./gearsim gallery --out docs/gallery`; each section names the
+shipped scenario that has the fault (`./gearsim run NAME`). The envelope's band is the one in which the fault adds
+most; dashed lines are the orders that the nameplate predicts for the component.
+"""
+
+
+def make_gallery(
+    out: Path, only: tuple[str, ...], seconds: float, progress: Callable[[int, int, str], None]
+) -> list[Path]:
+    """Draw the pictures into the folder `out`, and its page if all kinds are asked for.
+
+    Parameters
+    ----------
+    out : Path
+        Made if it is not there.
+    only : tuple of str
+        Kinds to draw; all if empty.
+    seconds : float
+        Simulated time of each record.
+    progress : callable
+        Called with what is done, how much there is, and the kind at hand.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+    """
+    chosen = cases(only)
+    out.mkdir(parents=True, exist_ok=True)
+    files, sections = [], []
+    for number, case in enumerate(chosen):
+        progress(number, len(chosen), case.kind)
+        comparison = compare(case, seconds)
+        picture = out / f"{case.kind}.png"
+        half = picture.with_name(f".{case.kind}.png")
+        draw(comparison, f"{case.kind} at {case.component} (scenario {case.example})", half)
+        os.replace(half, picture)
+        files.append(picture)
+        sections.append(_section(case, comparison))
+    if not only:
+        page = out / PAGE
+        contents = "\n".join(f"- [{case.kind}](#{case.kind})" for case in chosen)
+        page.write_text(_HEAD + "\n" + contents + "\n\n" + "\n".join(sections), encoding="utf-8")
+        files.append(page)
+    return files
+
+
+def _section(case: Case, comparison: Comparison) -> str:
+    kind = REGISTRY[case.kind]
+    healthy, faulty = comparison.rms
+    return (
+        f"## {case.kind}\n{_sentence(kind.summary)} {kind.look_for}\n\n"
+        f"Scenario `{case.example}`, {case.component}, {comparison.speed_hz:g} Hz: rms of {comparison.channel} "
+        f"{healthy:.3g} to {faulty:.3g} {comparison.unit}.\n\n![{case.kind}]({case.kind}.png)\n"
+    )
+
+
+def _sentence(text: str) -> str:
+    text = text[:1].upper() + text[1:]
+    return text if text.endswith(".") else text + "."
