@@ -14,10 +14,10 @@ from gearsim_sim.model.faults import REGISTRY
 PAGE = "README.md"
 _HEAD = """# Gallery
 
-One picture for every kind of fault that can be injected: the channel that shows it best, healthy in grey and with
-the fault in red; nothing else differs. Made by `./gearsim gallery --out docs/gallery`; each section names the
-shipped scenario that has the fault (`./gearsim run NAME`). The envelope's band is the one in which the fault adds
-most; dashed lines are the orders that the nameplate predicts for the component.
+One picture for every kind of fault that can be injected: the channel that shows it best, healthy in grey and
+with the fault in red; nothing else differs. Made by `./gearsim gallery --out docs/gallery`; each section names
+the shipped scenario that has the fault (`./gearsim run NAME`). The envelope's band is the one in which the fault
+adds most; dashed lines are the orders that the nameplate predicts for the component.
 """
 
 
@@ -65,10 +65,11 @@ def make_gallery(
 def _section(case: Case, comparison: Comparison) -> str:
     kind = REGISTRY[case.kind]
     healthy, faulty = comparison.rms
+    change = f"rms of {comparison.channel} {healthy:.3g} to {faulty:.3g} {comparison.unit}"
     return (
-        f"## {case.kind}\n{_sentence(kind.summary)} {kind.look_for}\n\n"
-        f"Scenario `{case.example}`, {case.component}, {comparison.speed_hz:g} Hz: rms of {comparison.channel} "
-        f"{healthy:.3g} to {faulty:.3g} {comparison.unit}.\n\n![{case.kind}]({case.kind}.png)\n"
+        f"## {case.kind}\n{_sentence(kind.summary)}\n\n*Look for:* {kind.look_for}\n\n"
+        f"Scenario `{case.example}`, {case.component}, {comparison.speed_hz:g} Hz: {change}.\n\n"
+        f"![{case.kind}]({case.kind}.png)\n"
     )
 
 

@@ -21,11 +21,10 @@ def draw(comparison: Comparison, title: str, out: Path) -> None:
     with mpl.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.axisbelow": True}):
         figure = Figure(figsize=(11, 6.2), layout="constrained")
         figure.suptitle(title, fontsize=11)
-        top, bottom = figure.subfigures(2, 1, height_ratios=(1, 1.15))
-        _waveform(top.subplots(), comparison)
-        left, right = bottom.subplots(1, 2)
-        _spectrum(left, comparison)
-        _envelope(right, comparison)
+        axes = figure.subplot_mosaic([["waveform", "waveform"], ["spectrum", "envelope"]])
+        _waveform(axes["waveform"], comparison)
+        _spectrum(axes["spectrum"], comparison)
+        _envelope(axes["envelope"], comparison)
         figure.savefig(out, dpi=_DPI, metadata={"Software": None})
 
 
