@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsim_io.bags import BagWriter, StreamWriter
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.machines import load_machine
 from gearsim_io.record import EdgeTrain, PulseTrain, Record
 
@@ -37,7 +37,9 @@ def make_record(
     )
 
 
-def objects_of(record: Record, size: int = 512) -> list[SampleBatch | TachoBatch | EncoderBatch]:
+def objects_of(
+    record: Record, size: int = 512
+) -> list[SampleBatch | TachoBatch | EncoderBatch | TorqueBatch]:
     """The record as batches."""
     return list(record.batches(size))
 

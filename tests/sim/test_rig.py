@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.scenario import load_scenario, scenario_names
@@ -21,13 +21,15 @@ def _bits(batches):
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_shipped_scenarios_run(name):
-    simulation = Simulation(load_scenario(name))
-    batches = simulation.advance(simulation.scenario.batch_samples)
-    assert [type(b) for b in batches] == [SampleBatch, TachoBatch, TachoBatch, EncoderBatch, EncoderBatch]
+    scenario = load_scenario(name)
+    simulation = Simulation(scenario)
+    batches = simulation.advance(scenario.batch_samples)
+    sensors = scenario.sensors
+    kinds = [SampleBatch, *[TachoBatch] * len(sensors.tachos), *[EncoderBatch] * len(sensors.encoders)]
+    assert [type(b) for b in batches] == kinds + [TorqueBatch] * bool(sensors.torques)
     assert np.all(batches[0].data.std(axis=1) > 0)
     assert batches[0].channels == tuple(channel.name for channel in simulation.machine.channels)
-    kinds = {"healthy": 0, "demo": 0, "quick": 0, "inner_race": 1, "two_faults": 1, "speed_ramp": 1}
-    assert len(simulation.truth().faults) == kinds[name]
+    assert len(simulation.truth().faults) == len(scenario.faults)
 
 
 def test_portions_change_no_bit_and_a_live_run_is_replayed():
@@ -47,6 +49,16 @@ def test_portions_change_no_bit_and_a_live_run_is_replayed():
     assert list(_bits(again)) == list(_bits(batches))
     healthy = list(simulate(scenario, total / 20_000, 5))
     assert list(_bits(healthy)) != list(_bits(batches))  # and something did happen
+
+
+def test_the_torque_is_the_load_and_swings_with_the_mesh():
+    changes = {"sensors": {"torques": {"chain": "ideal", "shafts": ["input", "output"]}}}
+    record = to_record(load_scenario("quick", changes), 1.0)
+    assert record.torques is not None
+    assert record.torques.channels == ("input_torque", "output_torque")
+    # The load of 50 N m goes through both couplings (1:1); the settling after the start is over.
+    np.testing.assert_allclose(record.torques.data_nm.mean(axis=1), 50.0, rtol=0.01)
+    assert np.all(record.torques.data_nm.std(axis=1) > 1e-3)
 
 
 def test_tacho_and_encoder_agree_and_follow_the_speed():

@@ -9,17 +9,19 @@ from scipy import signal, stats
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Channel, Machine, Shaft
 from gearsim_io.quantities import validate
-from gearsim_sim.sensors.chain import STAGES, AccelerometerChain
+from gearsim_sim.sensors.chain import STAGES, MeasuringChain
 from gearsim_sim.sensors.delay import Delay, taps
-from gearsim_sim.sensors.noise import generator, normal
+from gearsim_sim.sensors.draws import generator, normal
 from gearsim_sim.sensors.rolloff import lowpass
-from gearsim_sim.sensors.rows import Accelerometer, SensorsModel, catalogue, sensor_table
+from gearsim_sim.sensors.rows import Row
+from gearsim_sim.sensors.settings import SensorsModel, chains
+from gearsim_sim.sensors.table import sensor_table
 
 RATE = 65536.0
 
 
 def _chain(*rows, rate=RATE, seed=1, sites=("a", "b")):
-    return AccelerometerChain(rows, sites, rate, seed)
+    return MeasuringChain(rows, sites, rate, seed)
 
 
 def _run(chain, motion, cuts=()):
@@ -42,14 +44,14 @@ def test_rolloff_is_scipys_butterworth(bandwidth_hz):
     ours = lowpass(bandwidth_hz, RATE)
     np.testing.assert_allclose(ours, (*b, *a[1:]), rtol=1e-9, atol=1e-12)
     motion = _noise_motion(5000)
-    chain = _chain(Accelerometer("c", "b", bandwidth_hz=bandwidth_hz))
+    chain = _chain(Row("c", "b", bandwidth_hz=bandwidth_hz))
     np.testing.assert_allclose(_run(chain, motion)[0], signal.lfilter(b, a, motion[1]), rtol=1e-5, atol=1e-5)
 
 
 def test_measured_response_is_3_db_down_at_the_bandwidth():
     motion = np.zeros((2, 1 << 15))
     motion[0, 0] = 1.0
-    chain = _chain(Accelerometer("c", "a", bandwidth_hz=4096.0))
+    chain = _chain(Row("c", "a", bandwidth_hz=4096.0))
     gain = np.abs(np.fft.rfft(_run(chain, motion)[0]))
     step_hz = RATE / motion.shape[1]
     assert gain[round(4096 / step_hz)] == pytest.approx(np.sqrt(0.5), rel=1e-4)
@@ -61,14 +63,14 @@ def test_measured_response_is_3_db_down_at_the_bandwidth():
 
 def test_bandwidth_beyond_the_sampled_band_changes_nothing():
     motion = _noise_motion(1000)
-    chain = _chain(Accelerometer("c", "a", bandwidth_hz=25_600.0), rate=12_000.0)
+    chain = _chain(Row("c", "a", bandwidth_hz=25_600.0), rate=12_000.0)
     np.testing.assert_array_equal(_run(chain, motion)[0], motion[0].astype(np.float32))
 
 
 @pytest.mark.parametrize("rate", [12_000.0, 65_536.0, 97_656.0])
 def test_noise_has_its_density_at_any_rate_and_is_white_and_normal(rate):
     density = 3e-3
-    chain = _chain(Accelerometer("c", "a", noise_density=density), rate=rate)
+    chain = _chain(Row("c", "a", noise_density=density), rate=rate)
     noise = _run(chain, np.zeros((2, 1 << 18)))[0].astype(float)
     frequency, psd = signal.welch(noise, rate, nperseg=2048)
     level = np.sqrt(psd[2:-2])
@@ -89,8 +91,8 @@ def test_noise_is_indexed_by_sample_number_and_named_by_channel():
     others = [normal(generator(7, "y"), 10_000), normal(generator(8, "x"), 10_000)]
     for other in others:
         assert abs(np.corrcoef(whole, other)[0, 1]) < 0.05
-    alone = _run(_chain(Accelerometer("b", "b", noise_density=1e-3)), np.zeros((2, 500)))
-    rows = (Accelerometer("a", "a", noise_density=1e-3), Accelerometer("b", "b", noise_density=1e-3))
+    alone = _run(_chain(Row("b", "b", noise_density=1e-3)), np.zeros((2, 500)))
+    rows = (Row("a", "a", noise_density=1e-3), Row("b", "b", noise_density=1e-3))
     both = _run(_chain(*rows), np.zeros((2, 500)))
     np.testing.assert_array_equal(both[1], alone[0])
     assert abs(np.corrcoef(both)[0, 1]) < 0.2
@@ -98,7 +100,7 @@ def test_noise_is_indexed_by_sample_number_and_named_by_channel():
 
 @pytest.mark.parametrize("bits", [8, 16])
 def test_quantisation_steps_codes_and_error(bits):
-    row = Accelerometer("c", "a", range_m_s2=50.0, adc_bits=bits)
+    row = Row("c", "a", full_scale=50.0, adc_bits=bits)
     motion = np.vstack([np.linspace(-60, 60, 200_001), np.zeros(200_001)])
     out = _run(_chain(row), motion)[0].astype(float)
     step = 100.0 / 2**bits
@@ -113,14 +115,14 @@ def test_quantisation_steps_codes_and_error(bits):
 
 
 def test_clipping_without_converter():
-    row = Accelerometer("c", "a", range_m_s2=5.0)
+    row = Row("c", "a", full_scale=5.0)
     motion = _noise_motion(1000)
     np.testing.assert_array_equal(_run(_chain(row), motion)[0], np.clip(motion[0], -5, 5).astype(np.float32))
 
 
 @pytest.mark.parametrize("delay", [0.0, 1.0, 0.25, 3.6, 40.9])
 def test_delay_moves_a_sine_by_exactly_so_much(delay):
-    chain = _chain(Accelerometer("c", "a", delay_s=delay / RATE), Accelerometer("d", "b"))
+    chain = _chain(Row("c", "a", delay_s=delay / RATE), Row("d", "b"))
     for frequency in (0.002, 0.05, 0.2, 0.4):
         n = np.arange(-chain.past, 3000 + chain.ahead)
         motion = np.vstack([np.sin(2 * np.pi * frequency * n)] * 2)
@@ -132,21 +134,21 @@ def test_delay_moves_a_sine_by_exactly_so_much(delay):
 
 def test_delay_weights_keep_a_constant():
     assert taps(0.3).sum() == pytest.approx(1.0, abs=1e-15)
-    assert Delay([Accelerometer("c", "a")], RATE).past == 0
+    assert Delay([Row("c", "a")], RATE).past == 0
 
 
 def test_everything_off_is_the_motion_itself():
     motion = _noise_motion(2000)
-    chain = _chain(Accelerometer("c", "b"))
+    chain = _chain(Row("c", "b"))
     assert chain.past == chain.ahead == 0
     np.testing.assert_array_equal(_run(chain, motion)[0], motion[1].astype(np.float32))
 
 
 def test_chunks_do_not_change_a_bit():
     rows = [
-        Accelerometer("a", "a", "x", 30.0, 9000.0, 2e-3, 12, 2.5 / RATE),
-        Accelerometer("b", "b", "y", 1000.0, 25_600.0, 5e-4, 24, 0.0),
-        Accelerometer("c", "a", "x", None, 500.0, 1e-3, None, 7.0 / RATE),
+        Row("a", "a", "x", 30.0, 9000.0, 2e-3, 12, 2.5 / RATE),
+        Row("b", "b", "y", 1000.0, 25_600.0, 5e-4, 24, 0.0),
+        Row("c", "a", "x", None, 500.0, 1e-3, None, 7.0 / RATE),
     ]
     motion = _noise_motion(20_000)
     whole = _run(_chain(*rows), motion)
@@ -156,13 +158,13 @@ def test_chunks_do_not_change_a_bit():
 
 
 def test_every_stage_of_the_registry_can_be_off():
-    rows = [Accelerometer("c", "a")]
+    rows = [Row("c", "a")]
     assert [name for name, build in STAGES if build(rows, RATE, 0).active] == []
 
 
 def test_unknown_site():
     with pytest.raises(InputError, match="sensor c: site: got top, expected one of a, b"):
-        _chain(Accelerometer("c", "top"))
+        _chain(Row("c", "top"))
 
 
 def _machine(full_scale=float("nan")):
@@ -184,8 +186,8 @@ def _table(content, **kwargs):
 def test_default_table_follows_the_machine():
     table = _table({}, full_scale=80.0)
     assert [row.channel for row in table.accelerometers] == ["p", "q"]
-    assert table.accelerometers[0].range_m_s2 == 80.0
-    assert table.accelerometers[1].range_m_s2 == catalogue()["lab"].range
+    assert table.accelerometers[0].full_scale == 80.0
+    assert table.accelerometers[1].full_scale == chains()["lab"].range
     assert [t.shaft for t in table.tachos] == ["input"]
     assert [(e.shaft, e.lines) for e in table.encoders] == [("output", 900)]
 
@@ -204,7 +206,7 @@ def test_a_scenario_changes_all_or_one():
     q, top = table.accelerometers
     assert q.noise_density is None
     assert q.bandwidth_hz == top.bandwidth_hz == 8000
-    assert (top.site, top.range_m_s2, top.axis) == ("p", 2000, "z")
+    assert (top.site, top.full_scale, top.axis) == ("p", 2000, "z")
     assert top.delay_s == pytest.approx(3e-6)
     assert table.encoders == ()
 
@@ -212,7 +214,10 @@ def test_a_scenario_changes_all_or_one():
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"accelerometers": {"chain": "x"}}, r"sensors.accelerometers.chain: got x, expected one of ideal, "),
+        (
+            {"accelerometers": {"chain": "x"}},
+            r"chain: got x, expected one of charge_slip_ring, ",
+        ),
         (
             {"accelerometers": {"channels": ["p", "z"]}},
             "sensors.accelerometers.channels: got z, expected one",
@@ -225,7 +230,7 @@ def test_a_scenario_changes_all_or_one():
         ({"accelerometers": {"all": {"adc_bits": 12.5}}}, "whole number of adc_bits"),
         ({"tachos": {"shafts": ["rear"]}}, "sensors.tachos: shafts: got rear, expected one of input, output"),
         ({"encoders": {"lines": 0}}, "encoders.lines: got 0"),
-        ({"microphones": {}}, "no such key; one of accelerometers, encoders, tachos"),
+        ({"microphones": {}}, "no such key; one of accelerometers, encoders, tachos, torques"),
     ],
 )
 def test_bad_tables_are_told_in_one_line(content, message):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rig_double import LOOKAHEAD, RigDouble
 
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.messages import message_name, pure_types, to_msg
 from gearsim_sim.events import FaultSpec
@@ -157,7 +157,15 @@ def test_events_of_the_timeline_come_at_their_sample(scenario):
 def load_ideal(scenario):
     rows = tuple(
         dataclasses.replace(
-            row, range_m_s2=None, bandwidth_hz=None, noise_density=None, adc_bits=None, delay_s=0.0
+            row,
+            full_scale=None,
+            bandwidth_hz=None,
+            noise_density=None,
+            adc_bits=None,
+            delay_s=0.0,
+            mounting=None,
+            mains=None,
+            dropouts=None,
         )
         for row in scenario.sensors.accelerometers
     )
@@ -250,3 +258,87 @@ def test_the_model_is_asked_in_moderate_portions(scenario):
     double = RigDouble(RATE)
     list(simulate(scenario, 1.0, model=double))
     assert max(double.calls) <= BATCH + 32
+
+
+SENSORS = """
+sensors:
+  accelerometers:
+    channels: [b1_y, b3_y, slant]
+    sampling: {oversampling: 4, antialias: none}
+    all: {mounting: {resonance: 20 kHz, q: 20}, mains: {amplitude: 0.2 m/s^2}, dropouts: {rate: 5 Hz}}
+    each: {slant: {site: {b1_y: 0.6, b3_y: 0.8}, delay: 100 us}}
+  tachos: {jitter: 50 us, missing: 0.1, each: {output: {jitter: 0 s}}}
+  encoders: {mark_error: 0.02, clock: 1 MHz}
+  torques: {shafts: [input]}
+timeline:
+  - {at: 0.1 s, inject: {kind: outer_race_spall, component: bearing_3, ramp: 0.05 s, id: spall}}
+"""
+
+
+def _faulty(tmp_path):
+    path = tmp_path / "faulty.yaml"
+    start = SCENARIO[: SCENARIO.index("sensors:")]
+    path.write_text(start + SENSORS)
+    return load_scenario(path)
+
+
+class FastDouble(RigDouble):
+    """At four times the rate, with a torque."""
+
+    def __init__(self):
+        super().__init__(4 * RATE)
+
+    def advance(self, n, events=()):
+        output = super().advance(n, events)
+        k = np.arange(output.first_sample, output.first_sample + n)
+        return dataclasses.replace(output, signals={"input_torque": 50 + np.sin(0.001 * k)})
+
+
+def test_sensors_that_work_faster_than_the_samples_come(tmp_path):
+    scenario = _faulty(tmp_path)
+    whole = list(simulate(scenario, 3300 / RATE, 7, FastDouble()))
+    kinds = [SampleBatch, TachoBatch, TachoBatch, EncoderBatch, EncoderBatch, TorqueBatch]
+    assert [type(batch) for batch in whole[:6]] == kinds
+    simulation = Simulation(scenario, 7, FastDouble())
+    portions = [1, 2, 3, 499, 501, 1294, 1000]
+    again = [batch for n in portions for batch in simulation.advance(n)] + simulation.finish()
+    assert_same(again, whole)
+    assert [batch.channels for batch in whole[:6:5]] == [("b1_y", "b3_y", "slant"), ("input_torque",)]
+
+
+def test_a_record_holds_the_torque_and_gives_its_batches(tmp_path):
+    scenario = _faulty(tmp_path)
+    record = to_record(scenario, 0.5, model=FastDouble())
+    assert record.torques is not None
+    assert record.torques.data_nm.shape == (1, 8192)
+    # the gain error, offset and noise of the chain, and the delay of its 1 kHz roll-off
+    exact = 50 + np.sin(0.004 * np.arange(8192))
+    np.testing.assert_allclose(record.torques.data_nm[0][200:], exact[200:], atol=0.5)
+    batches = [batch for batch in record.batches(BATCH) if isinstance(batch, TorqueBatch)]
+    live = [batch for batch in simulate(scenario, 0.5, 0, FastDouble()) if isinstance(batch, TorqueBatch)]
+    assert_same(batches, live)
+
+
+def test_events_keep_their_sample_when_sensors_work_faster(tmp_path):
+    scenario = _faulty(tmp_path)
+    ideal = dataclasses.replace(scenario, sensors=load_ideal(scenario))
+    live = Simulation(ideal, 0, FastDouble())
+    batches = live.advance(3000)
+    sample = live.inject(FaultSpec("inner_race_spall", "bearing_2", {"width_m": 1e-3}), ramp_s=0.0)
+    batches += live.advance(3000) + live.finish()
+    stream = np.concatenate([b.data[0] for b in batches if isinstance(b, SampleBatch)])
+    steps = np.flatnonzero(np.abs(np.diff(stream - np.sin(0.1 * 4 * np.arange(stream.size)))) > 1) + 1
+    assert steps.tolist() == [round(0.1 * RATE), sample]
+    events = ideal.with_events(live.truth().events)
+    assert_same(list(simulate(events, 6000 / RATE, 0, FastDouble())), batches)
+
+
+def test_sensor_mistakes_name_the_scenario(tmp_path):
+    scenario = _faulty(tmp_path)
+    with pytest.raises(
+        InputError, match=r"faulty\.yaml: sensors\.torques: shafts: got input_torque, expected no"
+    ):
+        Simulation(scenario, 0, RigDouble(4 * RATE))
+    fast = dataclasses.replace(scenario, sample_rate_hz=500_000.0)
+    with pytest.raises(InputError, match=r"sampling\.oversampling: got 4, expected at most 2"):
+        Simulation(fast)

@@ -14,13 +14,13 @@ import soundfile
 from numpy.typing import NDArray
 
 from gearsim_io.bags import BagWriter, StreamWriter
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_sim.scenario import Scenario
 from gearsim_sim.simulation import Simulation
 
 FORMATS = ("mcap", "npz", "wav")
-Batch = SampleBatch | TachoBatch | EncoderBatch
+Batch = SampleBatch | TachoBatch | EncoderBatch | TorqueBatch
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,10 @@ class _BagSink:
 
 
 class _NpzSink:
-    """Each channel as an array of its name, `tacho_<shaft>` and `encoder_<shaft>` in sample indices."""
+    """Each channel as an array of its name, `tacho_<shaft>` and `encoder_<shaft>` in sample indices.
+
+    Torques are arrays `torque_<shaft>` in N m.
+    """
 
     def __init__(self, simulation: Simulation, out: Path) -> None:
         self._simulation = simulation
@@ -134,6 +137,7 @@ class _NpzSink:
         self._data: list[NDArray[np.float32]] = []
         self._unit = "1"
         self._marks: dict[str, list[NDArray[np.float64]]] = {}
+        self._torques: dict[str, list[NDArray[np.float32]]] = {}
 
     def take(self, batches: list[Batch]) -> None:
         for batch in batches:
@@ -143,6 +147,9 @@ class _NpzSink:
             elif isinstance(batch, TachoBatch):
                 times = batch.first_sample + batch.pulse_offsets
                 self._marks.setdefault(f"tacho_{batch.shaft}", []).append(times)
+            elif isinstance(batch, TorqueBatch):
+                for name, values in zip(batch.channels, batch.data, strict=True):
+                    self._torques.setdefault(name, []).append(values)
             else:
                 times = batch.first_sample + batch.edge_offsets
                 self._marks.setdefault(f"encoder_{batch.shaft}", []).append(times)
@@ -152,6 +159,7 @@ class _NpzSink:
         names = [channel.name for channel in machine.channels]
         arrays = dict(zip(names, np.concatenate(self._data, axis=1), strict=True))
         arrays |= {name: np.concatenate(parts) for name, parts in self._marks.items()}
+        arrays |= {name: np.concatenate(parts) for name, parts in self._torques.items()}
         np.savez(
             self._file,
             unit=np.array(self._unit),

@@ -22,6 +22,7 @@ from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import Report
+from gearsim_io.batches import TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
@@ -149,6 +150,8 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     reports: list[Report] = []
     impulsive: list[Report] = []
     for batch in record.batches(settings.batch_samples):
+        if isinstance(batch, TorqueBatch):
+            continue
         reports += _pooled(envelope.push(batch), pool)
         impulsive += kurtosis.push(batch)
     reports += _pooled(envelope.finish(), pool)

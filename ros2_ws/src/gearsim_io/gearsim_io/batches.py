@@ -1,6 +1,7 @@
 """What flows through the rig: blocks of samples, tacho pulses and encoder edges on one sample clock.
 
-The classes mirror `gearsim_msgs` field by field and know no ROS. Arrays are read-only.
+The classes mirror `gearsim_msgs` field by field and know no ROS (a TorqueBatch travels as a SampleBatch
+on a topic of its own). Arrays are read-only.
 Times are integer nanoseconds; sample indices are integers that run from the start of the stream,
 and `t0_ns` belongs to `first_sample`.
 """
@@ -16,7 +17,7 @@ from gearsim_io.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SampleBatch:
+class _Samples:
     """Uniformly sampled channels; `data` is float32 of shape (channels, samples)."""
 
     t0_ns: int
@@ -28,7 +29,7 @@ class SampleBatch:
     frame_id: str = ""
 
     def __post_init__(self) -> None:
-        where = "SampleBatch"
+        where = type(self).__name__
         _check_rate(where, self.sample_rate_hz)
         _check_index(where, "first_sample", self.first_sample)
         if self.data.ndim != 2 or self.data.dtype != np.float32:
@@ -51,6 +52,24 @@ class SampleBatch:
     def end_sample(self) -> int:
         """Index after the last sample."""
         return self.first_sample + self.sample_count
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampleBatch(_Samples):
+    """Uniformly sampled accelerometers (or what a record holds); float32 of shape (channels, samples)."""
+
+
+TORQUE_UNIT = "N*m"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueBatch(_Samples):
+    """Torque in shafts on the sample clock of the accelerometers, in `TORQUE_UNIT`."""
+
+    @staticmethod
+    def of(batch: SampleBatch) -> TorqueBatch:
+        """A batch that came as samples on the topic of the torques."""
+        return TorqueBatch(*(getattr(batch, name) for name in _Samples.__slots__))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

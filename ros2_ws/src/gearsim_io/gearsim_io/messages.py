@@ -1,7 +1,7 @@
 """Between the plain classes of the rig and ROS messages, both ways and fast.
 
 Works with rclpy's message classes (`ros_types()`) and with those of the pure `rosbags` library
-(`pure_types()`, no ROS needed). The three batch types are converted by hand, as they carry the load;
+(`pure_types()`, no ROS needed). The batches are converted by hand, as they carry the load;
 all others by a rule: a field of a message is the attribute of the same name, or of that name with its
 unit appended (`speed` is `speed_hz`), or the entry in `_OTHER_NAMES`.
 """
@@ -18,7 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints, overload
 import numpy as np
 
 from gearsim_io import nameplate
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.message_types import FieldType, Types, full_name, pure_types, ros_types
 
@@ -44,7 +44,7 @@ def to_msg(obj: Any, types: Types, t_ns: int | None = None) -> Any:
 
     Parameters
     ----------
-    obj : SampleBatch, TachoBatch, EncoderBatch, Machine or any dataclass that mirrors a message by name
+    obj : a batch, Machine or any dataclass that mirrors a message by name
     types : Types
         Which family of classes to use.
     t_ns : int, optional
@@ -55,7 +55,7 @@ def to_msg(obj: Any, types: Types, t_ns: int | None = None) -> Any:
     InputError
         If `obj` lacks what the message needs.
     """
-    if isinstance(obj, SampleBatch):
+    if isinstance(obj, (SampleBatch, TorqueBatch)):
         return types.SampleBatch(
             header=types.header(obj.t0_ns, obj.frame_id),
             sample_rate=float(obj.sample_rate_hz),

@@ -70,6 +70,7 @@ LATCHED = Qos(depth=1, latched=True)
 
 ACCEL = Topic("accel", "gearsim_msgs/msg/SampleBatch", WAVEFORM)
 TACHO = Topic("tacho", "gearsim_msgs/msg/TachoBatch", WAVEFORM)
+TORQUE = Topic("torque", "gearsim_msgs/msg/SampleBatch", WAVEFORM)
 ENCODER = Topic("encoder", "gearsim_msgs/msg/EncoderBatch", WAVEFORM)
 MACHINE_INFO = Topic("machine_info", "gearsim_msgs/msg/MachineInfo", LATCHED)
 GROUND_TRUTH = Topic("ground_truth", "gearsim_msgs/msg/GroundTruth", LATCHED)
@@ -85,6 +86,7 @@ TOPICS = (
     ACCEL,
     TACHO,
     ENCODER,
+    TORQUE,
     MACHINE_INFO,
     GROUND_TRUTH,
     FEATURES,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import TORQUE_UNIT, EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +31,14 @@ class EdgeTrain:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Torques:
+    """Torque in shafts over a whole record; `data_nm` is float32 of shape (channels, samples)."""
+
+    channels: tuple[str, ...]
+    data_nm: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Record:
     """A recording in memory.
 
@@ -42,6 +50,7 @@ class Record:
         "m/s^2", or "1" where the source states none.
     data : ndarray of float32, shape (channels, samples)
     tachos, encoders : the angle signals, empty where there are none
+    torques : Torques or None
     t0_ns : int
         Time of sample 0.
     first_sample : int
@@ -63,6 +72,7 @@ class Record:
     machine: str = ""
     source: str = ""
     notes: dict[str, str] = field(default_factory=dict)
+    torques: Torques | None = None
 
     @property
     def sample_count(self) -> int:
@@ -74,7 +84,7 @@ class Record:
         """Duration."""
         return self.sample_count / self.sample_rate_hz
 
-    def batches(self, size: int = 4096) -> Iterator[SampleBatch | TachoBatch | EncoderBatch]:
+    def batches(self, size: int = 4096) -> Iterator[SampleBatch | TachoBatch | EncoderBatch | TorqueBatch]:
         """The record as the live stream would bring it, in blocks of `size` samples."""
         for start in range(0, self.sample_count, size):
             stop = min(start + size, self.sample_count)
@@ -107,4 +117,9 @@ class Record:
                     encoder.first_edge + int(lo),
                     encoder.samples[lo:hi] - start,
                     self.machine,
+                )
+            if self.torques is not None:
+                torque = np.ascontiguousarray(self.torques.data_nm[:, start:stop])
+                yield TorqueBatch(
+                    t0, self.sample_rate_hz, first, self.torques.channels, TORQUE_UNIT, torque, self.machine
                 )

@@ -21,7 +21,9 @@ from gearsim_io.nameplate import Channel, Machine
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.models import MODELS
-from gearsim_sim.sensors.rows import SensorsModel, SensorTable, sensor_table
+from gearsim_sim.sensors.rows import SensorTable
+from gearsim_sim.sensors.settings import SensorsModel
+from gearsim_sim.sensors.table import sensor_table
 from gearsim_sim.truth import fault_parameters
 
 FOLDER = Path(__file__).parent / "scenarios"
@@ -266,7 +268,7 @@ def _measured(machine: Machine, table: SensorTable) -> Machine:
             known.get(row.channel, Channel(row.channel)),
             axis=row.axis,
             unit="m/s^2",
-            full_scale=math.nan if row.range_m_s2 is None else row.range_m_s2,
+            full_scale=math.nan if row.full_scale is None else row.full_scale,
         )
         for row in table.accelerometers
     )

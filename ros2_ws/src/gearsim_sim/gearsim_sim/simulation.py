@@ -7,26 +7,26 @@ samples are asked for. `truth().events` of a live run is all that is needed to r
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
-from gearsim_io.record import EdgeTrain, PulseTrain, Record
+from gearsim_io.record import EdgeTrain, PulseTrain, Record, Torques
+from gearsim_sim.engine import MAX_RATE_HZ
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.history import History
 from gearsim_sim.models import MODELS, RunningModel
 from gearsim_sim.scenario import Scenario
-from gearsim_sim.sensors.chain import AccelerometerChain
-from gearsim_sim.sensors.edges import EdgeFinder
+from gearsim_sim.sensors.rig import Batch, RigSensors
 from gearsim_sim.sensors.rows import Encoder, Tacho
 from gearsim_sim.truth import GroundTruth
-from gearsim_sim.window import Window
 
 _T = TypeVar("_T")
-Batch = SampleBatch | TachoBatch | EncoderBatch
+_LEAST_OVERSAMPLING = 2  # steps per sample that the integrator needs
 
 
 class Simulation:
@@ -38,7 +38,8 @@ class Simulation:
     t0_ns : int
         Time of sample 0; stamps are t0 + sample / rate.
     model : RunningModel, optional
-        In place of the one that the scenario names.
+        In place of the one that the scenario names; it works at the sample rate times the sensors'
+        `sampling.oversampling`.
 
     Raises
     ------
@@ -49,7 +50,8 @@ class Simulation:
     def __init__(self, scenario: Scenario, t0_ns: int = 0, model: RunningModel | None = None) -> None:
         self.scenario = scenario
         self.t0_ns = t0_ns
-        self._model = model or _told(scenario, lambda: MODELS[scenario.model](scenario))
+        self._factor = scenario.sensors.sampling.oversampling
+        self._model = model or _told(scenario, lambda: _model(scenario))
         self._history = History(scenario)
         for number, event in enumerate(scenario.events):
             try:
@@ -60,15 +62,8 @@ class Simulation:
         self._requested = 0
         self._sent = 0
         self._finished = False
-        first = _told(scenario, lambda: self._model.advance(1))  # tells sites and shafts
-        self._chain = AccelerometerChain(
-            scenario.sensors.accelerometers, first.site_names, scenario.sample_rate_hz, scenario.seed
-        )
-        # An edge between the last sample of a batch and the next belongs to the batch: look one ahead.
-        self._window = Window(first, scenario.batch_samples, self._chain.past, max(1, self._chain.ahead))
-        self._tachos = [(row, EdgeFinder(row.pulses, row.phase_turns)) for row in scenario.sensors.tachos]
-        self._encoders = [(row, EdgeFinder(row.lines)) for row in scenario.sensors.encoders]
-        self._pulses = [0] * len(self._tachos)
+        first = _told(scenario, lambda: self._model.advance(self._factor))  # tells sites and shafts
+        self._sensors = _told(scenario, lambda: RigSensors(scenario, first))
 
     @property
     def machine(self) -> Machine:
@@ -90,15 +85,16 @@ class Simulation:
 
         Batches begin at multiples of the scenario's `batch_samples`, whatever the portions; samples of an
         incomplete batch wait for the next call or for `finish`. Of each stretch the SampleBatch comes
-        first, then one TachoBatch per tacho, then one EncoderBatch per encoder.
+        first, then one TachoBatch per tacho, then one EncoderBatch per encoder, then a TorqueBatch if
+        torques are measured.
         """
         if self._finished:
             raise RuntimeError("the simulation has been finished")
         self._requested += n_samples
         batches: list[Batch] = []
-        window = self._window
+        window, factor = self._sensors.window, self._factor
         while (missing := self._requested + window.ahead - window.head) > 0:
-            window.put(self._model.advance(min(missing, window.room)))
+            window.put(self._model.advance(min(missing, window.room) * factor))
             if window.room == 0:
                 batches += self._send(window.batch)
         return batches
@@ -138,45 +134,44 @@ class Simulation:
         return [self.truth(sample) for sample in self._history.changes(after, upto)]
 
     def _schedule(self, event: Event) -> int:
+        """Let the model do something; samples here are those of the batches, not those of the model."""
+        factor, model = self._factor, self._model
+        sample = event.at_sample
+        if sample is None and factor > 1:  # a sample of the batches, so that the run can be repeated
+            sample = -(-model.earliest_event_sample // factor)
+        at = None if sample is None else sample * factor
         if isinstance(event, Inject):
-            sample = self._model.inject(event.fault, event.ramp_s, event.at_sample)
+            at = model.inject(event.fault, event.ramp_s, at)
         elif isinstance(event, Clear):
-            sample = self._model.clear(event.fault_id, event.ramp_s, event.at_sample)
+            at = model.clear(event.fault_id, event.ramp_s, at)
         else:
-            sample = self._model.set_operating_point(
-                event.speed_hz, event.load_nm, event.ramp_s, event.at_sample
-            )
+            at = model.set_operating_point(event.speed_hz, event.load_nm, event.ramp_s, at)
+        sample = at // factor
         self._history.add(event, sample)
         return sample
 
     def _send(self, count: int) -> list[Batch]:
-        scenario = self.scenario
-        window = self._window
-        rate_hz = scenario.sample_rate_hz
         first = self._sent
-        t0_ns = self.t0_ns + round(first * 1e9 / rate_hz)
-        frame = self.machine.name
-        data = self._chain.process(window.accel(count), first, count)
-        batches: list[Batch] = [
-            SampleBatch(t0_ns, rate_hz, first, self._chain.channels, "m/s^2", data, frame)
-        ]
-        for number, (tacho, finder) in enumerate(self._tachos):
-            _, offsets = finder.find(*window.angle(tacho.shaft, count, rate_hz))
-            pulse = self._pulses[number]
-            self._pulses[number] += offsets.size
-            batches.append(
-                TachoBatch(
-                    t0_ns, rate_hz, first, count, tacho.shaft, float(tacho.pulses), pulse, offsets, frame
-                )
-            )
-        for encoder, finder in self._encoders:
-            edge, offsets = finder.find(*window.angle(encoder.shaft, count, rate_hz))
-            batches.append(
-                EncoderBatch(t0_ns, rate_hz, first, count, encoder.shaft, encoder.lines, edge, offsets, frame)
-            )
-        window.drop(count)
+        t0_ns = self.t0_ns + round(first * 1e9 / self.scenario.sample_rate_hz)
         self._sent += count
-        return batches
+        return self._sensors.read(first, count, t0_ns)
+
+
+def _model(scenario: Scenario) -> RunningModel:
+    """The model of a scenario, at the rate at which its sensors work."""
+    factor = scenario.sensors.sampling.oversampling
+    if factor > 1:
+        most = int(MAX_RATE_HZ // scenario.sample_rate_hz)
+        if factor > most:
+            where = f"{scenario.source}: sensors.accelerometers"
+            expected = f"at most {most}, so that the sensors work at {MAX_RATE_HZ:g} Hz or less"
+            raise InputError(where, "sampling.oversampling", factor, expected)
+        scenario = replace(
+            scenario,
+            sample_rate_hz=scenario.sample_rate_hz * factor,
+            oversampling=max(_LEAST_OVERSAMPLING, -(-scenario.oversampling // factor)),
+        )
+    return MODELS[scenario.model](scenario)
 
 
 def _told(scenario: Scenario, act: Callable[[], _T]) -> _T:
@@ -228,7 +223,15 @@ def to_record(
         machine=scenario.machine.name,
         source=f"scenario {scenario.name}",
         notes={"scenario": scenario.source, "seed": str(scenario.seed)},
+        torques=_torques(batches),
     )
+
+
+def _torques(batches: list[Batch]) -> Torques | None:
+    own = [batch for batch in batches if isinstance(batch, TorqueBatch)]
+    if not own:
+        return None
+    return Torques(own[0].channels, np.concatenate([batch.data for batch in own], axis=1))
 
 
 def _pulse_train(batches: list[Batch], tacho: Tacho) -> PulseTrain:

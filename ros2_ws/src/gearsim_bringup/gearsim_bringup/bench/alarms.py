@@ -11,6 +11,7 @@ from gearsim_dsp.results import Alarm
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor
 from gearsim_dsp.streams.report import AlarmedMonitor
+from gearsim_io.batches import TorqueBatch
 from gearsim_sim.scenario import Scenario, load_scenario
 from gearsim_sim.simulation import simulate
 
@@ -43,6 +44,8 @@ def _alarms(voice: Voice, scenario: Scenario, seconds: float) -> list[Alarm]:
     with voice.progress() as bar:
         task = bar.add_task(f"{scenario.name}, seed {scenario.seed}", total=seconds)
         for batch in simulate(scenario, seconds):
+            if isinstance(batch, TorqueBatch):
+                continue
             for monitor in monitors:
                 outcomes = monitor.push(batch)
                 found += [alarm for outcome in outcomes for alarm in outcome.alarms if alarm.level > 0]

@@ -11,11 +11,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gearsim_io.bags.reader import BagMessage, decode, read_bag, topics_of
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.messages import from_msg
 from gearsim_io.nameplate import Machine
-from gearsim_io.record import EdgeTrain, PulseTrain, Record
+from gearsim_io.qos import TORQUE
+from gearsim_io.record import EdgeTrain, PulseTrain, Record, Torques
 
 _SAMPLES = "gearsim_msgs/msg/SampleBatch"
 _SIGNALS = (_SAMPLES, "gearsim_msgs/msg/TachoBatch", "gearsim_msgs/msg/EncoderBatch")
@@ -34,7 +35,9 @@ def is_bag(path: Path | str) -> bool:
     return path.is_dir() or path.suffix == ".mcap"
 
 
-def read_objects(path: Path | str) -> Iterator[SampleBatch | TachoBatch | EncoderBatch | Machine]:
+def read_objects(
+    path: Path | str,
+) -> Iterator[SampleBatch | TachoBatch | EncoderBatch | TorqueBatch | Machine]:
     """The signals and nameplates of a bag as plain objects, in the order of recording.
 
     Raises
@@ -44,7 +47,7 @@ def read_objects(path: Path | str) -> Iterator[SampleBatch | TachoBatch | Encode
     """
     wanted = tuple(t.name for t in topics_of(path).values() if t.type in (*_SIGNALS, _MACHINE))
     for message in read_bag(path, wanted):
-        yield _plain(message)
+        yield _plain(message, torque=_is_torque(message.topic))
 
 
 def read_machine(path: Path | str) -> Machine | None:
@@ -84,11 +87,13 @@ def read_record(path: Path | str, machine: str | Path | None = None, topic: str 
 
         return import_file(path, machine)
     topics = topics_of(path)
-    chosen = _choose(str(path), [t.name for t in topics.values() if t.type == _SAMPLES], topic)
-    angles = [t.name for t in topics.values() if t.type in _SIGNALS[1:] and _beside(t.name, chosen)]
+    samples = [t.name for t in topics.values() if t.type == _SAMPLES]
+    chosen = _choose(str(path), samples, topic)
+    beside = [t for t in topics.values() if t.name != chosen and _beside(t.name, chosen)]
+    others = [t.name for t in beside if t.type in _SIGNALS[1:] or (t.name in samples and _is_torque(t.name))]
     build = _Assembly(str(path))
-    for message in read_bag(path, (chosen, *angles)):
-        build.add(_plain(message))
+    for message in read_bag(path, (chosen, *others)):
+        build.add(_plain(message, torque=message.topic != chosen and _is_torque(message.topic)))
     return build.record()
 
 
@@ -98,6 +103,7 @@ def _choose(where: str, names: list[str], wanted: str | None) -> str:
         if wanted not in names:
             raise InputError(where, "topic", wanted, f"one of its SampleBatch topics ({listed})")
         return wanted
+    names = [name for name in names if not _is_torque(name)] or names
     if len(names) != 1:
         raise InputError(where, "topics of type SampleBatch", listed, "exactly one, or one chosen by name")
     return names[0]
@@ -108,9 +114,14 @@ def _beside(name: str, samples: str) -> bool:
     return name.rsplit("/", 1)[0] == samples.rsplit("/", 1)[0]
 
 
-def _plain(message: BagMessage) -> Any:
+def _is_torque(name: str) -> bool:
+    return name.rsplit("/", 1)[-1] == TORQUE.name
+
+
+def _plain(message: BagMessage, *, torque: bool = False) -> Any:
     try:
-        return from_msg(decode(message))
+        found = from_msg(decode(message))
+        return TorqueBatch.of(found) if torque and isinstance(found, SampleBatch) else found
     except InputError as error:
         raise InputError(f"topic {message.topic}", error.field, error.value, error.expected) from None
 
@@ -129,8 +140,8 @@ class _Stretch:
     def end(self) -> int:
         return self.batches[-1].end_sample
 
-    def holds(self, batch: TachoBatch | EncoderBatch) -> bool:
-        """Whether an angle batch is of this stretch and not of another run that counted from 0 again."""
+    def holds(self, batch: TachoBatch | EncoderBatch | TorqueBatch) -> bool:
+        """Whether a batch is of this stretch and not of another run that counted from 0 again."""
         head = self.batches[0]
         offset_s = (batch.first_sample - head.first_sample) / head.sample_rate_hz
         same_time = abs(batch.t0_ns - head.t0_ns - offset_s * _NANOSECONDS) < _SAME_RUN_NS
@@ -145,11 +156,14 @@ class _Assembly:
         self._stretches: list[_Stretch] = []
         self._tachos: dict[str, list[TachoBatch]] = {}
         self._encoders: dict[str, list[EncoderBatch]] = {}
+        self._torques: list[TorqueBatch] = []
 
-    def add(self, batch: SampleBatch | TachoBatch | EncoderBatch) -> None:
+    def add(self, batch: SampleBatch | TachoBatch | EncoderBatch | TorqueBatch) -> None:
         """Take the next batch; after a gap or a restart of the index a new stretch begins."""
         if isinstance(batch, SampleBatch):
             self._add_samples(batch)
+        elif isinstance(batch, TorqueBatch):
+            self._torques.append(batch)
         elif isinstance(batch, TachoBatch):
             self._tachos.setdefault(batch.shaft, []).append(batch)
         else:
@@ -187,6 +201,7 @@ class _Assembly:
             machine=head.frame_id,
             source=self._where,
             notes=notes,
+            torques=_torque(longest, self._torques, notes),
         )
 
     def _gap_notes(self, chosen: _Stretch) -> dict[str, str]:
@@ -215,7 +230,21 @@ def _trains(
             yield train
 
 
-def _covers(stretch: _Stretch, batches: Sequence[TachoBatch | EncoderBatch]) -> bool:
+def _torque(stretch: _Stretch, batches: list[TorqueBatch], notes: dict[str, str]) -> Torques | None:
+    """The torques if they cover the stretch without a hole; otherwise that is noted."""
+    own = {batch.first_sample: batch for batch in batches if stretch.holds(batch)}
+    ordered = [own[first] for first in sorted(own)]
+    same = len({batch.channels for batch in ordered}) == 1
+    if not (same and _covers(stretch, ordered)):
+        if batches:
+            notes["torque"] = "incomplete, not used"
+        return None
+    skip = stretch.first - ordered[0].first_sample
+    data = np.concatenate([batch.data for batch in ordered], axis=1)
+    return Torques(ordered[0].channels, data[:, skip : skip + stretch.end - stretch.first])
+
+
+def _covers(stretch: _Stretch, batches: Sequence[TachoBatch | EncoderBatch | TorqueBatch]) -> bool:
     if not batches or batches[0].first_sample > stretch.first or batches[-1].end_sample < stretch.end:
         return False
     return all(before.end_sample == after.first_sample for before, after in pairwise(batches))

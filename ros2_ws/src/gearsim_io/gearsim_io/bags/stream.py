@@ -6,7 +6,7 @@ from typing import Any
 
 from gearsim_io import definitions, qos
 from gearsim_io.bags.writer import BagWriter
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.messages import message_name, pure_types, to_msg
 from gearsim_io.nameplate import Machine
@@ -15,6 +15,7 @@ _TOPICS = {
     "SampleBatch": qos.ACCEL,
     "TachoBatch": qos.TACHO,
     "EncoderBatch": qos.ENCODER,
+    "TorqueBatch": qos.TORQUE,
     "MachineInfo": qos.MACHINE_INFO,
     "GroundTruth": qos.GROUND_TRUTH,
     "Features": qos.FEATURES,
@@ -69,7 +70,7 @@ class StreamWriter:
         self._writer.write(topic.full_name, t_ns, data)
 
     def _time_of(self, obj: Any) -> int:
-        if isinstance(obj, (SampleBatch, TachoBatch, EncoderBatch)):
+        if isinstance(obj, (SampleBatch, TorqueBatch, TachoBatch, EncoderBatch)):
             return obj.t0_ns + round(obj.sample_count * 1e9 / obj.sample_rate_hz)
         if isinstance(obj, Machine):
             return self._last_ns

@@ -60,7 +60,7 @@ class Viewer(Node):
         self._nominal_hz = math.nan
         self._messages = self._refused = 0
         self._health = HealthPublisher(self)
-        listened = (qos.ACCEL, qos.TACHO, qos.FEATURES, qos.SPECTRUM, qos.ALARM, qos.GROUND_TRUTH)
+        listened = (qos.ACCEL, qos.TACHO, qos.TORQUE, qos.FEATURES, qos.SPECTRUM, qos.ALARM, qos.GROUND_TRUTH)
         for topic in (*listened, *(qos.ALARM_STATE.of(source) for source in SOURCES)):
             qos.create_subscription(self, topic, self._on_message)
         qos.create_subscription(self, qos.MACHINE_INFO, self._on_machine)

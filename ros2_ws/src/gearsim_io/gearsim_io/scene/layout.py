@@ -14,6 +14,8 @@ from gearsim_io.scene import style
 from gearsim_io.scene.canvas import TIMELINE
 from gearsim_io.scene.scene import Zoom
 
+TORQUE = "torque"
+"""Kind of the samples that are torques."""
 _HIDDEN = rrb.PlotLegend(visible=False)
 
 
@@ -39,7 +41,8 @@ class Focus:
     coloured : bool
         The front channel is drawn in colour, the others in grey.
     kinds : frozenset of str
-        Short names of the messages that there are; views of what is missing are left out. Empty: all.
+        Short names of the messages that there are, and `TORQUE`; views of what is missing are left out.
+        Empty: all but torque.
     """
 
     channel: str
@@ -79,7 +82,7 @@ def blueprint(focus: Focus, picture: bool = False) -> Any:
         ),
         _row(
             (5, _kurtosis(focus)) if focus.has("Features") else None,
-            (4, _speed(focus)) if focus.has("TachoBatch", "Features") else None,
+            (4, _operating_point(focus)) if focus.has("TachoBatch", "Features", TORQUE) else None,
             (6, _log()) if focus.has("Alarm") else None,
         ),
     ]
@@ -166,6 +169,15 @@ def _kurtosis(focus: Focus) -> Any:
         name=name,
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=not focus.coloured),
     )
+
+
+def _operating_point(focus: Focus) -> Any:
+    """Speed, and torque where it is measured."""
+    if TORQUE not in focus.kinds:
+        return _speed(focus)
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightBottom, visible=True)
+    torque = rrb.TimeSeriesView(origin="/load", name="Operating point: torque [N m]", plot_legend=legend)
+    return rrb.Tabs(_speed(focus), torque, active_tab=0)
 
 
 def _speed(focus: Focus) -> Any:

@@ -9,11 +9,12 @@ from typing import Any
 
 from gearsim_io import cdr
 from gearsim_io.bags import BagMessage, decode, read_bag
+from gearsim_io.batches import TORQUE_UNIT
 from gearsim_io.errors import InputError
 from gearsim_io.messages import from_msg, stamp_ns
 from gearsim_io.nameplate import Machine
 from gearsim_io.scene import style
-from gearsim_io.scene.layout import Focus
+from gearsim_io.scene.layout import TORQUE, Focus
 from gearsim_io.scene.scene import Zoom
 from gearsim_io.scene.style import Rgb
 
@@ -167,6 +168,9 @@ def _take(found: Overview, gaps: cdr.GapCounter, message: BagMessage) -> None:
     if short == "SampleBatch":
         gaps.add(message.topic, message.data, message.type)
         batch = from_msg(decode(message))
+        if batch.unit == TORQUE_UNIT:
+            found.kinds.add(TORQUE)
+            return
         if found.zero_ns is None:
             found.zero_ns = batch.t0_ns
             found.channels, found.unit = batch.channels, batch.unit

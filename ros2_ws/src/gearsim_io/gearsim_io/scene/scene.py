@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from gearsim_io.batches import TORQUE_UNIT
 from gearsim_io.messages import from_msg, stamp_ns
 from gearsim_io.scene import spectra, style
 from gearsim_io.scene.canvas import Canvas
@@ -64,6 +65,7 @@ class Scene:
         self._only_front = only_front
         self._zero_ns = zero_ns
         self._outliner: Outliner | None = None
+        self._torque_outliner: Outliner | None = None
         self._last_pulse_s: dict[str, float] = {}
         self._window: tuple[str, int] | None = None
         self._best: dict[str, tuple[float, float]] = {}
@@ -127,6 +129,9 @@ class Scene:
 
     def _add_samples(self, msg: Any) -> None:
         batch = from_msg(msg)
+        if batch.unit == TORQUE_UNIT:
+            self._add_torque(batch)
+            return
         t_s = self.time_s(batch.t0_ns)
         rate_hz = batch.sample_rate_hz
         zero_sample = batch.first_sample - t_s * rate_hz
@@ -150,6 +155,20 @@ class Scene:
                 detail = part[batch.channels.index(zoom.channel)]
                 self._canvas.rows(path, times, detail)
                 self._keep_peak("zoom", detail)
+
+    def _add_torque(self, batch: Any) -> None:
+        """Measured torques, beside the commanded load."""
+        t_s, rate_hz = self.time_s(batch.t0_ns), batch.sample_rate_hz
+        if self._torque_outliner is None:
+            self._torque_outliner = Outliner(round(2 * rate_hz / self._points_per_s))
+        places, values = self._torque_outliner.push(batch.first_sample, batch.data)
+        times = (places - batch.first_sample) / rate_hz + t_s
+        for row, channel in enumerate(batch.channels):
+            path = style.entity("load", channel)
+            self._canvas.line(
+                path, f"{channel} [{batch.unit}]", style.other(self._canvas.lines_below("load"))
+            )
+            self._canvas.rows(path, times, values[row])
 
     def _keep_peak(self, root: str, values: Any) -> None:
         self.peaks[root] = max(self.peaks[root], float(np.abs(values).max(initial=0.0)))

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 
 from gearsim_io import qos
-from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch
+from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.messages import ros_types, to_msg
 from gearsim_sim.outbox import Outbox
 from gearsim_sim.simulation import Batch, Simulation
@@ -24,15 +24,19 @@ class RigPublisher:
     node : rclpy.node.Node
     clock : bool
         Publish /clock too.
+    torque : bool
+        Publish torques too.
     """
 
-    def __init__(self, node: Node, *, clock: bool) -> None:
+    def __init__(self, node: Node, *, clock: bool, torque: bool = False) -> None:
         self._types = ros_types()
         self._waveforms = {
             SampleBatch: qos.create_publisher(node, qos.ACCEL),
             TachoBatch: qos.create_publisher(node, qos.TACHO),
             EncoderBatch: qos.create_publisher(node, qos.ENCODER),
         }
+        if torque:
+            self._waveforms[TorqueBatch] = qos.create_publisher(node, qos.TORQUE)
         self._machine = qos.create_publisher(node, qos.MACHINE_INFO)
         self._truth = qos.create_publisher(node, qos.GROUND_TRUTH)
         self._clock = qos.create_publisher(node, qos.CLOCK) if clock else None
@@ -40,7 +44,7 @@ class RigPublisher:
         self._truth_upto = -1
 
     def subscribers(self) -> tuple[int, ...]:
-        """Subscriptions of accel, tacho and encoder."""
+        """Subscriptions of accel, tacho and encoder (and torque, if it is sent)."""
         return tuple(publisher.get_subscription_count() for publisher in self._waveforms.values())
 
     def start(self, simulation: Simulation) -> None:

@@ -38,7 +38,9 @@ class Simulator(Node):
         self._given = given
         self._health = HealthPublisher(self, scenario.machine.name)
         self._health.report("pacing", Level.OK, "compiling")
-        self._publisher = RigPublisher(self, clock=given.publish_clock)
+        self._publisher = RigPublisher(
+            self, clock=given.publish_clock, torque=bool(scenario.sensors.torques)
+        )
         self._simulation = Simulation(scenario)
         self._rig_services = RigServices(self, self._simulation)
         self._pacer = Pacer(scenario.sample_rate_hz, scenario.rate_factor)

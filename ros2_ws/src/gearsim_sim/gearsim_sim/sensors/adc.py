@@ -7,21 +7,23 @@ becomes the nearest code, and what lies outside becomes the outermost one (clipp
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.sensors.rows import Accelerometer
+if TYPE_CHECKING:
+    from gearsim_sim.sensors.rows import Row
 
 
 class Converter:
     """Clipping and rounding of all channels, in place; a channel without range is left as it is."""
 
-    def __init__(self, rows: Sequence[Accelerometer]) -> None:
+    def __init__(self, rows: Sequence[Row]) -> None:
         self._settings = [
-            (channel, row.range_m_s2, row.adc_bits)
+            (channel, row.full_scale, row.adc_bits)
             for channel, row in enumerate(rows)
-            if row.range_m_s2 is not None
+            if row.full_scale is not None
         ]
 
     @property
@@ -31,13 +33,13 @@ class Converter:
 
     def apply(self, block: NDArray[np.float64], first_sample: int) -> None:  # noqa: ARG002
         """Convert `block` (channels, samples) to the values that the codes stand for."""
-        for channel, range_m_s2, bits in self._settings:
+        for channel, full_scale, bits in self._settings:
             signal = block[channel]
             if bits is None:
-                np.clip(signal, -range_m_s2, range_m_s2, out=signal)
+                np.clip(signal, -full_scale, full_scale, out=signal)
                 continue
             half = 2.0 ** (bits - 1)
-            step = range_m_s2 / half
+            step = full_scale / half
             signal *= 1.0 / step
             np.rint(signal, out=signal)
             np.clip(signal, -half, half - 1.0, out=signal)

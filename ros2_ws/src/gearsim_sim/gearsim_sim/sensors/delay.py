@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.sensors.rows import Accelerometer
+if TYPE_CHECKING:
+    from gearsim_sim.sensors.rows import Row
 
 _HALF = 16
 _BETA = 8.0
@@ -29,7 +31,7 @@ def taps(fraction: float) -> NDArray[np.float64]:
 class Delay:
     """Reads each channel later by its delay out of a window that reaches `past` back and `ahead` forward."""
 
-    def __init__(self, rows: Sequence[Accelerometer], sample_rate_hz: float) -> None:
+    def __init__(self, rows: Sequence[Row], sample_rate_hz: float) -> None:
         self._plans = [_plan(row.delay_s * sample_rate_hz) for row in rows]
         self.past = max((whole + _HALF for whole, _ in self._plans), default=0) if self._delayed else 0
         self.ahead = _HALF if any(weights is not None for _, weights in self._plans) else 0

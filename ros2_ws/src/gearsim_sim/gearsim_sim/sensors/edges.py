@@ -22,11 +22,16 @@ class EdgeFinder:
         Marks per turn.
     phase_turns : float
         Angle of mark 0 in turns.
+    errors_turns : ndarray, shape (marks,), optional
+        How far each mark lies from its place, in turns; the marks must stay in their order.
     """
 
-    def __init__(self, marks: int, phase_turns: float = 0.0) -> None:
+    def __init__(
+        self, marks: int, phase_turns: float = 0.0, errors_turns: NDArray[np.float64] | None = None
+    ) -> None:
         self._marks = marks
         self._phase = phase_turns
+        self._errors = np.zeros(marks) if errors_turns is None else errors_turns
         self._next: int | None = None
 
     def find(
@@ -48,7 +53,7 @@ class EdgeFinder:
         -------
         first_edge : int
             Index of the first edge found (or, without any, of the next one): edge k is mark k modulo
-            `marks`, passed at the angle phase + k / marks turns.
+            `marks`, passed at the angle phase + k / marks turns, plus the mark's error.
         offsets : ndarray of float64
             Where, as fractional samples from the first sample, ascending, below turns.size - 1.
         """
@@ -57,20 +62,29 @@ class EdgeFinder:
         first = self._next
         reach = float(np.max(turns - turns[0] + fraction)) + 1.0
         out = np.empty(math.ceil(reach * self._marks) + 2)
-        count = _passages(turns, fraction, turns_per_sample, self._marks, self._phase, first, out)
+        count = _passages(
+            turns, fraction, turns_per_sample, self._marks, self._phase, self._errors, first, out
+        )
         self._next = first + count
         return first, out[:count].copy()
 
     def _first_mark(self, turns: int, fraction: float) -> int:
-        return turns * self._marks + math.ceil((fraction - self._phase) * self._marks)
+        mark = turns * self._marks + math.ceil((fraction - self._phase) * self._marks)
+        if not self._errors.any():
+            return mark
+        mark -= 1  # an error is less than a spacing
+        while self._phase + (mark / self._marks - turns) + self._errors[mark % self._marks] < fraction:
+            mark += 1
+        return mark
 
 
 @njit(cache=True, nogil=True)
-def _passages(turns, fraction, speed, marks, phase, first, out):  # type: ignore[no-untyped-def]
+def _passages(turns, fraction, speed, marks, phase, errors, first, out):  # type: ignore[no-untyped-def]
     count = 0
     edge = first
     edge_turns = edge // marks
-    edge_fraction = phase + (edge - edge_turns * marks) / marks
+    mark = edge - edge_turns * marks
+    edge_fraction = phase + mark / marks + errors[mark]
     for i in range(turns.size - 1):
         end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
         while end > 0.0:
@@ -81,7 +95,8 @@ def _passages(turns, fraction, speed, marks, phase, first, out):  # type: ignore
             count += 1
             edge += 1
             edge_turns = edge // marks
-            edge_fraction = phase + (edge - edge_turns * marks) / marks
+            mark = edge - edge_turns * marks
+            edge_fraction = phase + mark / marks + errors[mark]
             end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
     return count
 

@@ -1,0 +1,202 @@
+"""How scenarios write the sensor table, and the chains that are shipped.
+
+`catalogue.yaml` names measuring chains (`lab`, `ideal`, ...) with value, unit and source of each number.
+A scenario picks one and may change parts of it, for all channels or for one; `off` switches an effect off.
+An effect with several numbers (`mounting`, `mains`, ...) is replaced as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from gearsim_io.quantities import Si, Strict, load_yaml
+from gearsim_sim.sensors.drift import Drift
+from gearsim_sim.sensors.dropouts import Dropouts
+from gearsim_sim.sensors.gain import Temperature
+from gearsim_sim.sensors.highpass import HighPass
+from gearsim_sim.sensors.interference import Inverter, Mains
+from gearsim_sim.sensors.marks import Pickup
+from gearsim_sim.sensors.mounting import Mounting, mountings
+from gearsim_sim.sensors.options import OrOff, SiOrOff, is_off
+from gearsim_sim.sensors.overload import Overload
+from gearsim_sim.sensors.rows import Mix
+from gearsim_sim.sensors.sampling import Sampling
+
+CATALOGUE = Path(__file__).parent / "catalogue.yaml"
+
+MaybeFloat = float | None
+Accel = Annotated[float, Si("m/s^2", ge=0)]
+Torque = Annotated[float, Si("N*m", ge=0)]
+AdcBits = Annotated[MaybeFloat, SiOrOff("", ge=2, le=32)]
+
+
+def _named_mounting(raw: Any) -> Any:
+    if is_off(raw):
+        return None
+    if isinstance(raw, str):
+        if raw not in mountings():
+            raise ValueError("one of " + ", ".join(mountings()) + ", off, or {resonance, q}")
+        return mountings()[raw]
+    return raw
+
+
+def _mix(raw: Any) -> Any:
+    """A site's name, or a mapping of sites and weights, as a weighted sum."""
+    if raw is None or isinstance(raw, tuple):
+        return raw
+    if isinstance(raw, str):
+        return ((raw, 1.0),)
+    weights = list(raw.values()) if isinstance(raw, dict) else []
+    if not weights or any(isinstance(w, bool) or not isinstance(w, (int, float)) for w in weights):
+        raise ValueError("a site, or sites with their weights, such as {b1_x: 0.7071, b1_y: 0.7071}")
+    return tuple((str(name), float(weight)) for name, weight in raw.items())
+
+
+Sites = Annotated[Mix | None, BeforeValidator(_mix)]
+
+
+class Effects(Strict):
+    """The numbers of a chain that do not depend on what it measures; what is left out stays as it is."""
+
+    bandwidth: Annotated[MaybeFloat, SiOrOff("Hz", gt=0)] = None
+    noise_corner: Annotated[MaybeFloat, SiOrOff("Hz", gt=0.01, le=1e5)] = None
+    adc_bits: AdcBits = None
+    delay: Annotated[float, Si("s", ge=0, le=1)] = 0.0
+    gain_error: Annotated[float, Si("", gt=-1, le=1)] = 0.0
+    temperature: Annotated[Temperature | None, OrOff()] = None
+    dropouts: Annotated[Dropouts | None, OrOff()] = None
+
+    @model_validator(mode="after")
+    def _whole_bits(self) -> Effects:
+        if self.adc_bits is not None and self.adc_bits != round(self.adc_bits):
+            raise ValueError("a whole number of adc_bits")
+        return self
+
+    def given(self) -> dict[str, Any]:
+        """What was written, under the names of `Row`."""
+        names = {"range": "full_scale", "bandwidth": "bandwidth_hz", "delay": "delay_s"}
+        names["noise_corner"] = "noise_corner_hz"
+        own = self.model_fields_set - {"site", "axis", "description"}
+        found = {names.get(key, key): getattr(self, key) for key in own}
+        if found.get("adc_bits") is not None:
+            found["adc_bits"] = round(found["adc_bits"])
+        if "cross_axis" in found:
+            found["cross_axis"] = found["cross_axis"] or ()
+        return found
+
+
+class AccelerometerEffects(Effects):
+    """The numbers of an accelerometer's chain."""
+
+    range: Annotated[MaybeFloat, SiOrOff("m/s^2", gt=0)] = None
+    noise_density: Annotated[MaybeFloat, SiOrOff("m/s^2/Hz^0.5", ge=0)] = None
+    offset: Annotated[float, Si("m/s^2")] = 0.0
+    mounting: Annotated[Mounting | None, BeforeValidator(_named_mounting)] = None
+    high_pass: Annotated[HighPass | None, OrOff()] = None
+    drift: Annotated[Drift[Accel] | None, OrOff()] = None
+    mains: Annotated[Mains[Accel] | None, OrOff()] = None
+    inverter: Annotated[Inverter[Accel] | None, OrOff()] = None
+    overload: Annotated[Overload | None, OrOff()] = None
+
+
+class TorqueEffects(Effects):
+    """The numbers of a torque transducer's chain."""
+
+    range: Annotated[MaybeFloat, SiOrOff("N*m", gt=0)] = None
+    noise_density: Annotated[MaybeFloat, SiOrOff("N*m/Hz^0.5", ge=0)] = None
+    offset: Annotated[float, Si("N*m")] = 0.0
+    zero_per_k: Annotated[float, Si("N*m/K")] = 0.0
+    drift: Annotated[Drift[Torque] | None, OrOff()] = None
+    mains: Annotated[Mains[Torque] | None, OrOff()] = None
+    inverter: Annotated[Inverter[Torque] | None, OrOff()] = None
+
+
+class OneAccelerometer(AccelerometerEffects):
+    """Changes of one channel; `site` lets it look elsewhere, `cross_axis` adds parts of other sites."""
+
+    site: Sites = None
+    axis: str | None = None
+    cross_axis: Annotated[Mix | None, OrOff(), BeforeValidator(_mix)] = None
+
+
+class AccelerometerChain(AccelerometerEffects):
+    """A chain of the catalogue for accelerometers."""
+
+    description: str = ""
+
+
+class TorqueChain(TorqueEffects):
+    """A chain of the catalogue for torque transducers."""
+
+    description: str = ""
+
+
+class Catalogue(Strict):
+    """The shipped chains by name."""
+
+    accelerometers: dict[str, AccelerometerChain]
+    torques: dict[str, TorqueChain]
+
+
+class AccelerometersModel(Strict):
+    """The accelerometers of a scenario.
+
+    `chain` is a name of the catalogue, `channels` the channels that exist (default: all of the machine),
+    `all` changes every channel, `each` single ones; `sampling` is the converter's that takes them all.
+    """
+
+    chain: str = "lab"
+    channels: tuple[str, ...] | None = Field(default=None, min_length=1)
+    sampling: Sampling = Sampling()
+    all: AccelerometerEffects = AccelerometerEffects()
+    each: dict[str, OneAccelerometer] = Field(default_factory=dict)
+
+
+class TorquesModel(Strict):
+    """Shafts with a torque transducer (default: none), each a channel `<shaft>_torque`."""
+
+    chain: str = "strain_gauge"
+    shafts: tuple[str, ...] = ()
+    all: TorqueEffects = TorqueEffects()
+    each: dict[str, TorqueEffects] = Field(default_factory=dict)
+
+
+class TachosModel(Pickup):
+    """Shafts with a tacho (default: those of the machine); `each` changes single ones."""
+
+    shafts: tuple[str, ...] | None = None
+    pulses: Annotated[int, Field(ge=1, le=10_000)] = 1
+    each: dict[str, Pickup] = Field(default_factory=dict)
+
+
+class EncodersModel(Pickup):
+    """Shafts with an encoder (default: those of the machine); `each` changes single ones."""
+
+    shafts: tuple[str, ...] | None = None
+    lines: Annotated[int, Field(ge=1, le=100_000)] = 900
+    each: dict[str, Pickup] = Field(default_factory=dict)
+
+
+class SensorsModel(Strict):
+    """The `sensors` section of a scenario."""
+
+    accelerometers: AccelerometersModel = AccelerometersModel()
+    tachos: TachosModel = TachosModel()
+    encoders: EncodersModel = EncodersModel()
+    torques: TorquesModel = TorquesModel()
+
+
+@cache
+def catalogue() -> Catalogue:
+    """The shipped chains."""
+    return load_yaml(Catalogue, CATALOGUE, require_source=True)
+
+
+def chains() -> Mapping[str, AccelerometerChain]:
+    """The shipped chains of accelerometers by name."""
+    return catalogue().accelerometers
