@@ -35,6 +35,7 @@ COMMANDS = {
     "view": "view",
     "bench": "bench",
     "gallery": "gallery",
+    "parameters": "parameters",
     "data": "data",
 }
 # Done by the entry script before this program starts; listed here so that --help is complete.
