@@ -40,7 +40,8 @@ def _waveform(axes: Axes, comparison: Comparison) -> None:
 
 def _spectrum(axes: Axes, comparison: Comparison) -> None:
     shown = comparison.frequency_hz >= _LOWEST_HZ
-    for density, colour in zip(comparison.densities, (_HEALTHY, _FAULTY), strict=True):
+    # Healthy in front: what rises above it in red is the fault's.
+    for density, colour in zip(comparison.densities[::-1], (_FAULTY, _HEALTHY), strict=True):
         level = 10 * np.log10(np.maximum(density[shown], np.finfo(float).tiny))
         axes.plot(comparison.frequency_hz[shown], level, color=colour, linewidth=0.7)
     highest = max(10 * np.log10(density[shown].max()) for density in comparison.densities)
@@ -54,7 +55,7 @@ def _spectrum(axes: Axes, comparison: Comparison) -> None:
 
 def _envelope(axes: Axes, comparison: Comparison) -> None:
     shown = comparison.orders > 0.05
-    for power, colour in zip(comparison.envelopes, (_HEALTHY, _FAULTY), strict=True):
+    for power, colour in zip(comparison.envelopes[::-1], (_FAULTY, _HEALTHY), strict=True):
         axes.plot(comparison.orders[shown], 2 * np.sqrt(power[shown]), color=colour, linewidth=0.8)
     for family in comparison.families:
         axes.axvline(family.order, color=_MARK, linestyle="--", linewidth=0.7)

@@ -1,0 +1,73 @@
+"""The gallery shows every kind of fault, each by a difference that the fault alone makes."""
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from gearsim_bringup.gallery.analysis import compare
+from gearsim_bringup.gallery.cases import cases, faults_of
+from gearsim_bringup.gallery.page import make_gallery
+from gearsim_io.errors import InputError
+from gearsim_sim.model.faults import REGISTRY
+
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+
+
+@pytest.fixture(scope="module")
+def outer():
+    (case,) = cases(("outer_race_spall",))
+    return case
+
+
+def test_every_kind_has_a_scenario_that_shows_it():
+    found = {case.kind: case for case in cases()}
+    assert set(found) == set(REGISTRY)
+    for kind, case in found.items():
+        assert any(fault.kind == kind for fault in faults_of(case.faulty))
+        assert not any(fault.kind == kind for fault in faults_of(case.healthy))
+        assert REGISTRY[kind].look_for, kind
+
+
+def test_healthy_and_faulty_differ_by_the_fault_alone(outer):
+    faulty, healthy = outer.faulty, outer.healthy
+    assert (faulty.seed, faulty.speed_hz, faulty.load_nm) == (healthy.seed, healthy.speed_hz, healthy.load_nm)
+    assert faulty.sensors == healthy.sensors
+    assert not faulty.events
+    assert not healthy.events
+
+
+def test_the_picture_shows_the_line_that_the_nameplate_predicts(outer):
+    """BPFO stands out of the envelope of the faulty record, in the channel and band that were chosen."""
+    comparison = compare(outer, 2.0)
+    (family,) = [one for one in comparison.families if one.fault == "outer_race"]
+    healthy, faulty = comparison.envelopes
+    near = np.abs(comparison.orders - family.order) < 0.1
+    elsewhere = (comparison.orders > 1) & ~near
+    assert faulty[near].max() > 10 * np.median(faulty[elsewhere])
+    assert faulty[near].max() > 10 * healthy[near].max()
+
+
+def test_pictures_are_drawn_and_show_both_records(outer, tmp_path):
+    seen = []
+    files = make_gallery(tmp_path / "new", (outer.kind,), 0.5, lambda *progress: seen.append(progress))
+    assert files == [tmp_path / "new" / "outer_race_spall.png"]
+    assert seen == [(0, 1, "outer_race_spall")]
+    pixels = matplotlib.image.imread(files[0])[:, :, :3]
+    red = (pixels[..., 0] > 0.6) & (pixels[..., 1] < 0.4)
+    grey = (np.abs(pixels - 0x8A / 255) < 0.05).all(axis=2)
+    assert red.sum() > 500
+    assert grey.sum() > 500
+
+
+def test_unknown_kinds_are_named():
+    with pytest.raises(InputError, match="outer_race_spall"):
+        cases(("crack",))
+
+
+def test_the_gallery_in_docs_is_complete():
+    page = (GALLERY / "README.md").read_text(encoding="utf-8")
+    for kind in REGISTRY:
+        assert f"![{kind}]({kind}.png)" in page
+        assert (GALLERY / f"{kind}.png").is_file()

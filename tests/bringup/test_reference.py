@@ -1,0 +1,75 @@
+"""The reference of parameters says what the program checks, and docs/parameters.md is that reference."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pytest
+
+from gearsim_bringup.reference import Parameter, parameters, table
+from gearsim_bringup.reference_page import markdown, sections
+from gearsim_io.errors import InputError
+from gearsim_io.quantities import Si, Strict, validate
+from gearsim_sim.model.faults import REGISTRY
+
+PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
+
+
+class Inner(Strict):
+    mass: Annotated[float, Si("kg", gt=0, le=5)]
+    """Of the small part,
+    in kilograms."""
+
+
+class Outer(Strict):
+    kind: Literal["a", "b"] = "a"
+    length: Annotated[float, Si("m", ge=0)] | None = None
+    """How long."""
+    parts: dict[str, Inner]
+    rows: tuple[Inner, ...] = ()
+
+
+def test_parameters_tell_unit_range_default_and_meaning():
+    assert list(parameters(Outer)) == [
+        Parameter("kind", "", "a, b", "a", ""),
+        Parameter("length", "m", ">= 0", "none", "How long."),
+        Parameter("parts.<name>.mass", "kg", "> 0 and <= 5", "required", "Of the small part, in kilograms."),
+        Parameter("rows[].mass", "kg", "> 0 and <= 5", "required", "Of the small part, in kilograms."),
+    ]
+
+
+def test_the_range_is_what_validation_accepts():
+    with pytest.raises(InputError, match="<= 5"):
+        validate(Outer, {"parts": {"one": {"mass": "6 kg"}}}, "here")
+
+
+def test_a_bar_in_a_text_does_not_break_the_table():
+    row = table([Parameter("x", "", "", "", "this | that")]).splitlines()[-1]
+    assert row.replace("\\|", "").count("|") == 6
+
+
+def test_every_fault_and_kind_of_machine_is_there():
+    names = {one.name for one in sections()}
+    assert set(REGISTRY) | {"scenario", "parallel_shaft", "planetary", "bearing_rig"} == names
+
+
+def test_every_parameter_has_a_meaning():
+    silent = [f"{one.name}: {row.name}" for one in sections() for row in one.rows if not row.meaning]
+    assert not silent
+
+
+def test_numbers_of_shipped_machines_have_sources():
+    for one in sections():
+        for machine, name, value, source in one.values:
+            assert value, (machine, name)
+            assert source, (machine, name)
+
+
+def test_unknown_sections_are_named():
+    with pytest.raises(InputError, match="scenario"):
+        sections("gear")
+
+
+def test_the_page_in_docs_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == markdown(sections(), whole=True), (
+        "./gearsim parameters --out docs/parameters.md"
+    )
