@@ -9,6 +9,7 @@ or beside its element, a table in `loop_data.Drive`, and the lines that add it i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -53,4 +54,8 @@ class MeshMod:
 
     def samples(self) -> NDArray[np.float64]:
         """The series as a table."""
+        return self._table
+
+    @cached_property
+    def _table(self) -> NDArray[np.float64]:
         return self.series.table()
