@@ -50,7 +50,7 @@ class Lanes(types.Type):
         super().__init__(name="float64_lanes")
 
 
-lanes: Any = Lanes()  # type: ignore[no-untyped-call]
+lanes: Any = Lanes()
 
 
 def intrinsic(definition: Any) -> Any:
@@ -63,7 +63,7 @@ class _LanesModel(models.PrimitiveModel):
     """Held as one LLVM vector."""
 
     def __init__(self, manager: Any, fe_type: Any) -> None:
-        super().__init__(manager, fe_type, _VECTOR)
+        super().__init__(manager, fe_type, _VECTOR)  # type: ignore[no-untyped-call]
 
 
 def _operation(function: Any, count: int, build: Callable[..., Any]) -> None:
