@@ -1,4 +1,4 @@
-"""Spalls: geometry, the ball's way through them, severity, and every entry of the registry."""
+"""Spalls of races: geometry, the ball's way through them, severity, refusals."""
 
 import json
 
@@ -16,6 +16,7 @@ from gearsim_sim.params.parallel import BEARINGS
 
 BALL, OUTER, INNER = 3.56e-3, 22.81e-3, 15.69e-3
 RATE_HZ = 65536.0
+RACE_SPALLS = ("inner_race_spall", "outer_race_spall")
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +111,7 @@ def crossings(forces):
                 yield force[start : end[0]]
 
 
-@pytest.mark.parametrize("kind", sorted(REGISTRY))
+@pytest.mark.parametrize("kind", RACE_SPALLS)
 def test_entry_to_impact_time(params, plant, kind):
     """About 0.6 ms for 0.8 mm at 10 Hz on either race (thesis 5.8).
 
@@ -139,7 +140,7 @@ def test_entry_to_impact_time(params, plant, kind):
     assert np.median(times) == pytest.approx(0.6e-3, abs=0.06e-3)
 
 
-@pytest.mark.parametrize("kind", sorted(REGISTRY))
+@pytest.mark.parametrize("kind", RACE_SPALLS)
 def test_event_spacing_in_the_acceleration(params, kind):
     """At the pedestal unloading and reloading stand 0.6 ms or somewhat more apart.
 
@@ -162,7 +163,7 @@ def test_event_spacing_in_the_acceleration(params, kind):
     assert 0.5e-3 < np.median(spacing) < 0.9e-3, spacing
 
 
-@pytest.mark.parametrize("kind", sorted(REGISTRY))
+@pytest.mark.parametrize("kind", RACE_SPALLS)
 def test_zero_severity_equals_healthy_bit_for_bit(params, kind):
     healthy = Engine(params, 5, RATE_HZ).advance(4000)
     fault = FaultSpec(kind, "bearing_2", severity=0.0)
@@ -173,7 +174,7 @@ def test_zero_severity_equals_healthy_bit_for_bit(params, kind):
         assert np.array_equal(faulty.fraction, healthy.fraction)
 
 
-@pytest.mark.parametrize("kind", sorted(REGISTRY))
+@pytest.mark.parametrize("kind", RACE_SPALLS)
 def test_severity_is_continuous_and_the_seed_decides(params, kind):
     def accel(severity, seed=5):
         position = {"position_rad": -np.pi / 2 - 2 * np.pi * 0.55} if "inner" in kind else {}
@@ -186,7 +187,7 @@ def test_severity_is_continuous_and_the_seed_decides(params, kind):
     assert not np.array_equal(full, accel(1.0, seed=6))
 
 
-@pytest.mark.parametrize("kind", sorted(REGISTRY))
+@pytest.mark.parametrize("kind", RACE_SPALLS)
 def test_parameters_survive_json_and_units(plant, kind):
     plain = build(plant, kind, width_m=1.2e-3, depth_m=2e-5, position_rad=0.3, row=2)
     worded = build(plant, kind, width_m="1.2 mm", depth_m="20 um", position_rad="0.3 rad", row=2)

@@ -16,10 +16,10 @@ from gearsim_sim.integrate.kernel import pack_constants, pack_state
 from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.integrate.pieces import circle_table
 from gearsim_sim.model.assembly import LinearSystem, Vector
-from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop
+from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop, make_work
 from gearsim_sim.model.loop_data import Data, Part
 from gearsim_sim.model.plant import Moment, Plant, RotatingSite, StateRow
-from gearsim_sim.model.plant_data import bearing_data, mesh_data
+from gearsim_sim.model.plant_data import bearing_data, bearing_memory, mesh_data
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.schedule import Schedule
 
@@ -104,7 +104,7 @@ class Stepper:
         shape = self._data.bearings.cosines.shape
         sizes = [size for part in parts for size in (part.part.length // 2, part.interfaces.size)]
         self._loops = [make_loop(*sizes, shape[1], with_rates) for with_rates in (False, True)]
-        self._missing = np.zeros(shape)
+        self._memory = bearing_memory(self._data.bearings)
         self.row_count = len(vectors)
         self._state = self._at_rest()
 
@@ -150,8 +150,9 @@ class Stepper:
         motion = np.empty((count // self.oversampling + 1, width))
         s0, s1 = self._state
         drive = self._schedule.drive()
+        work = make_work(self._data, drive, self._place.size)
         samples = self._loops[drive.need_rates](
-            s0, s1, self._data, drive, self._missing, self.step, count, accel, column, motion
+            s0, s1, self._data, drive, self._memory, work, self.step, count, accel, column, motion
         )
         self.step += count
         return self._unpack(motion[:samples].T)

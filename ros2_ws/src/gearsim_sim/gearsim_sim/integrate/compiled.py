@@ -26,9 +26,13 @@ _ROOT = Path(__file__).parents[1]
 _FOLDERS = ("integrate", "model")
 
 
-def compiled(function: Function) -> Function:
-    """The function compiled, running without the interpreter's lock, cached on disk if possible."""
-    return _compiled(function, FAST)
+def compiled(function: Function, *, allocates: bool = True) -> Function:
+    """The function compiled, running without the interpreter's lock, cached on disk if possible.
+
+    One that allocates no arrays need not count references to them either. In a loop whose arrays come in
+    tuples that counting can cost several times what the work does.
+    """
+    return _compiled(function, FAST, allocates=allocates)
 
 
 def compiled_exactly(function: Function) -> Function:
@@ -36,8 +40,10 @@ def compiled_exactly(function: Function) -> Function:
     return _compiled(function, False)
 
 
-def _compiled(function: Function, fast: set[str] | bool) -> Function:
+def _compiled(function: Function, fast: set[str] | bool, *, allocates: bool = True) -> Function:
     options: dict[str, Any] = {"nogil": True, "fastmath": fast, "error_model": "numpy"}
+    if not allocates:
+        options["_nrt"] = False
     folder = cache_folder()
     if folder is None:
         return cast(Function, numba.njit(**options)(function))
@@ -53,6 +59,12 @@ def _compiled(function: Function, fast: set[str] | bool) -> Function:
 def inlined(function: Function) -> Function:
     """A part of a compiled loop, copied into it: sizes that are constants there become constants here."""
     return cast(Function, numba.njit(inline="always", fastmath=FAST, error_model="numpy")(function))
+
+
+def apart(function: Function) -> Function:
+    """A part of a compiled loop that is called, not copied; it allocates nothing. For what few steps need."""
+    options: dict[str, Any] = {"nogil": True, "fastmath": FAST, "error_model": "numpy", "_nrt": False}
+    return cast(Function, numba.njit(**options)(function))
 
 
 @cache

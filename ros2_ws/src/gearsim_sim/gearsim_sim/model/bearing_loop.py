@@ -1,103 +1,178 @@
-"""Forces of all rolling bearings in the compiled loop; the readable twin is `BearingSeat`."""
+"""Forces of all rolling bearings in the compiled loop; the readable twin is `BearingSeat`.
+
+Healthy bearings take the short way, `ball_forces`; which way a bearing takes is decided once per bearing and
+step, never per ball. What faults do is entered beforehand, see `bearing_fault_loop`. Slipping cages and oil
+films have a memory.
+"""
 
 from __future__ import annotations
 
 import math
 
-from gearsim_sim.integrate.compiled import inlined
-from gearsim_sim.integrate.pieces import cosine_sine, ramp
-from gearsim_sim.model.loop_data import Array, Bearings, Drive, Indices
+from gearsim_sim.integrate.compiled import apart, inlined
+from gearsim_sim.integrate.pieces import cosine_sine
+from gearsim_sim.model.bearing_fault_loop import (
+    CAGE,
+    CLEARANCE,
+    DIRTY,
+    FILM,
+    MEAN_FORCE,
+    PLAY,
+    SLIPS,
+    SQUEEZE,
+    SQUEEZE_ROOT,
+    enter_profiles,
+    enter_spalls,
+    enter_terms,
+    place_spalls,
+    severity,
+    turn_balls,
+)
+from gearsim_sim.model.loop_data import Array, BearingMemory, Bearings, Drive
 
-_OWN = 4  # first column behind those of the severity
-
-
-@inlined
-def severity(row: Array, step: int) -> float:
-    """Severity of a row of a table at a step."""
-    rise, _, _ = ramp(float(step) - row[2], row[3])
-    value: float = row[0] + (row[1] - row[0]) * rise
-    return value
-
-
-@inlined
-def spall_ball(row: Array, step: int, phases: Array, bearings: Bearings) -> tuple[int, float]:
-    """The ball nearest to a spall, and how much the race is away under it."""
-    bearing = int(row[_OWN])
-    now = severity(row, step)
-    count = bearings.balls_per_row[bearing]
-    middle = row[_OWN + 5] + row[_OWN + 3] * phases[int(row[_OWN + 2])]
-    cage = phases[bearings.index[bearing, 2]]
-    place = (middle - cage - bearings.row_offsets[bearing, int(row[_OWN + 1])]) * count
-    nearest = math.floor(place + 0.5)
-    beta = row[_OWN + 6] - abs(place - nearest) * (2.0 * math.pi / count)
-    ball = int(row[_OWN + 1]) * count + int(nearest) % count
-    if beta <= 0.0 or now == 0.0:
-        return ball, 0.0
-    race, radius = row[_OWN + 8], row[_OWN + 9]
-    chord = race * math.sin(beta)
-    half = math.sin(0.5 * beta)
-    sagitta = 2.0 * race * half * half
-    own = radius - math.sqrt(radius * radius - chord * chord)
-    drop = own + sagitta if row[_OWN + 4] != 0.0 else own - sagitta
-    return ball, now * min(row[_OWN + 7], drop)
+__all__ = ["bearing_forces", "place_spalls", "severity"]
+_FORCE_MEMORY_S = 0.1  # over which the force is averaged that decides on the slip
+_NEWTON = 3  # steps for an oil film; one settles a steady film, three one that is hit
 
 
 @inlined
-def contact_force(
-    x: float, y: float, c: float, s: float, bearing: int, bearings: Bearings, missing: Array, balls: int
+def ball_forces(
+    along: float, across: float, clearance: float, b: int, bearings: Bearings, missing: Array, balls: int
 ) -> tuple[float, float]:
-    """Force of the inner ring on the outer ring; c and s turn into the frame of the cage.
+    """Sum of gap^1.5 over the balls in contact, in the frame of the cage.
 
-    `missing` is (bearings, balls); `balls` must be a compile-time constant, see `times_state`: so few are
-    too few for a loop of free length to fill vector registers.
+    `balls` must be a compile-time constant, see `times_state`: so few are too few for a loop of free length
+    to fill vector registers. Rows of arrays are not taken out: counting references to them would cost more.
     """
-    along, across = x * c + y * s, y * c - x * s
-    clearance = bearings.numbers[bearing, 1]
     fx = 0.0
     fy = 0.0
     for j in range(balls):
-        cj, sj = bearings.cosines[bearing, j], bearings.sines[bearing, j]
-        gap = along * cj + across * sj - clearance - missing[bearing, j]
+        cj, sj = bearings.cosines[b, j], bearings.sines[b, j]
+        gap = along * cj + across * sj - clearance - missing[b, j]
         gap = gap if gap > 0.0 else 0.0
         force = gap * math.sqrt(gap)
         fx += force * cj
         fy += force * sj
-    factor = bearings.numbers[bearing, 0]
-    return factor * (fx * c - fy * s), factor * (fx * s + fy * c)
+    return fx, fy
 
 
 @inlined
-def place_spalls(
-    step: int, phases: Array, drive: Drive, bearings: Bearings, missing: Array, touched: Indices
-) -> None:
-    """Enter what spalls take away under their nearest balls into `missing`; `touched` says where."""
-    for j in range(drive.spalls.shape[0]):
-        bearing = int(drive.spalls[j, _OWN])
-        ball, depth = spall_ball(drive.spalls[j], step, phases, bearings)
-        touched[j, 0] = bearing
-        touched[j, 1] = ball
-        missing[bearing, ball] += depth
+def film_thickness(
+    gap: float, before: float, factor: float, roller: bool, unit: float, squeeze: float, squeeze_root: float
+) -> float:
+    """Thickness of an oil film after this step over that under 1 N, by an implicit step; see `oil_film`.
+
+    c(h) (h - h_before) / step + k (gap + h)^n - Q_s(h) = 0 has one root, as the left side grows with h. The
+    constants of squeeze are over the step's length, `unit` is the thickness under 1 N.
+    """
+    damping = squeeze + squeeze_root / math.sqrt(unit * before)
+    z = before
+    for _ in range(_NEWTON):
+        inverse = 1.0 / z
+        square = inverse * inverse
+        fifth = square * square * inverse
+        carried = fifth * fifth if roller else fifth * fifth * fifth
+        elastic = max(gap + unit * z, 0.0)
+        slope = factor * (elastic ** (1.0 / 9.0) if roller else math.sqrt(elastic))
+        rest = damping * (1.0 - before * inverse) + slope * elastic - carried
+        growth = damping * before * square + (10.0 / 9.0 if roller else 1.5) * slope * unit
+        growth += (10.0 if roller else 15.0) * carried * inverse
+        z = min(max(z - rest / growth, 0.5 * z), 2.0 * z)
+    return z
+
+
+@apart
+def other_forces(
+    along: float, across: float, clearance: float, b: int, bearings: Bearings, memory: BearingMemory,
+    now: Array, step_s: float, balls: int,
+) -> tuple[float, float]:  # fmt: skip
+    """The same for rollers, for balls out of the middle of their pockets, and with oil films.
+
+    A film of the thickness h adds to the gap, (gap + h)^n; it moves on by a step.
+    """
+    turn_balls(b, bearings, memory, now)
+    roller, unit, factor = bearings.rollers[b] != 0, now[b, FILM], bearings.numbers[b, 0]
+    squeeze, squeeze_root = now[b, SQUEEZE] / step_s, now[b, SQUEEZE_ROOT] / step_s
+    fx = 0.0
+    fy = 0.0
+    for j in range(balls):
+        cj, sj = memory.cosines[b, j], memory.sines[b, j]
+        gap = along * cj + across * sj - clearance - memory.missing[b, j]
+        if unit > 0.0:
+            z = film_thickness(gap, memory.film[b, j], factor, roller, unit, squeeze, squeeze_root)
+            memory.film[b, j] = z
+            gap += unit * z
+        gap = gap if gap > 0.0 else 0.0
+        force = gap ** (10.0 / 9.0) if roller else gap * math.sqrt(gap)
+        fx += force * cj
+        fy += force * sj
+    return fx, fy
+
+
+@apart
+def jump_forces(
+    found: int, q: Array, phases: Array, bearings: Bearings, circle: Array, memory: BearingMemory, now: Array,
+    jumps: Array, forces: Array,
+) -> None:  # fmt: skip
+    """What rectangular pits change in the forces: the force without the pit, part by part that with it."""
+    for i in range(found):
+        b, ball = int(jumps[i, 0]), int(jumps[i, 1])
+        c, s = cosine_sine(phases[bearings.index[b, 2]] + now[b, CAGE], circle)
+        own_c, own_s = bearings.cosines[b, ball], bearings.sines[b, ball]
+        if now[b, PLAY] != 0.0:
+            own_c, own_s = memory.cosines[b, ball], memory.sines[b, ball]
+        ux, uy = own_c * c - own_s * s, own_c * s + own_s * c
+        ix, iy = bearings.index[b, 0], bearings.index[b, 1]
+        gap = q[ix] * ux + q[iy] * uy - bearings.numbers[b, 1] - now[b, CLEARANCE] - memory.missing[b, ball]
+        if now[b, FILM] > 0.0:
+            gap += now[b, FILM] * memory.film[b, ball]
+        exponent = 1.5 if bearings.rollers[b] == 0 else 10.0 / 9.0
+        pit = max(gap - jumps[i, 2], 0.0) ** exponent - max(gap, 0.0) ** exponent
+        change = bearings.numbers[b, 0] * jumps[i, 3] * pit
+        forces[ix] -= change * ux
+        forces[iy] -= change * uy
 
 
 @inlined
 def bearing_forces(
-    step: int, q: Array, rates: Array, phases: Array, drive: Drive, bearings: Bearings, circle: Array,  # noqa: ARG001
-    missing: Array, touched: Indices, forces: Array, balls: int,
+    step: int, q: Array, phases: Array, speed: float, drive: Drive, bearings: Bearings, circle: Array,
+    memory: BearingMemory, now: Array, jumps: Array, forces: Array, step_s: float, balls: int,
 ) -> None:  # fmt: skip
-    """Forces of the bearings beyond their linear part, into `forces`; `missing` is zero before and after.
+    """Forces of the bearings beyond their linear part, into `forces`.
 
-    `rates` of the interfaces are zero unless `drive.need_rates`.
+    `memory.missing` is zero before and after. `balls` is a compile-time constant.
     """
-    place_spalls(step, phases, drive, bearings, missing, touched)
+    if drive.bearing_terms.shape[0] > 0:
+        enter_terms(step, speed, step_s, drive, bearings, memory, now)
+    found = 0
+    if drive.spalls.shape[0] > 0:
+        found = enter_spalls(step, speed * step_s, phases, drive, bearings, memory, now, jumps)
+    if drive.profiles.shape[0] > 0:
+        enter_profiles(step, phases, drive, bearings, memory, now)
     cage, c, s = -1.0, 1.0, 0.0
     for b in range(bearings.index.shape[0]):
-        angle = phases[bearings.index[b, 2]]
+        angle = phases[bearings.index[b, 2]] + now[b, CAGE]
         if angle != cage:  # bearings of one kind on one shaft share their cage's angle
             cage = angle
             c, s = cosine_sine(cage, circle)
         ix, iy = bearings.index[b, 0], bearings.index[b, 1]
-        fx, fy = contact_force(q[ix], q[iy], c, s, b, bearings, missing, balls)
-        forces[ix] = bearings.numbers[b, 2] * q[ix] - fx
-        forces[iy] = bearings.numbers[b, 2] * q[iy] - fy
-    for j in range(touched.shape[0]):
-        missing[touched[j, 0], touched[j, 1]] = 0.0
+        x, y = q[ix], q[iy]
+        along, across = x * c + y * s, y * c - x * s
+        clearance = bearings.numbers[b, 1] + now[b, CLEARANCE]
+        if bearings.rollers[b] != 0 or now[b, PLAY] != 0.0 or now[b, FILM] > 0.0:
+            fx, fy = other_forces(along, across, clearance, b, bearings, memory, now, step_s, balls)
+        else:
+            fx, fy = ball_forces(along, across, clearance, b, bearings, memory.missing, balls)
+        factor = bearings.numbers[b, 0]
+        forces[ix] = bearings.numbers[b, 2] * x - factor * (fx * c - fy * s)
+        forces[iy] = bearings.numbers[b, 2] * y - factor * (fx * s + fy * c)
+        if now[b, SLIPS] != 0.0:
+            size = factor * math.sqrt(fx * fx + fy * fy)
+            memory.cage[b, MEAN_FORCE] += (size - memory.cage[b, MEAN_FORCE]) * (step_s / _FORCE_MEMORY_S)
+    if found > 0:
+        jump_forces(found, q, phases, bearings, circle, memory, now, jumps, forces)
+    for b in range(bearings.index.shape[0]):
+        if now[b, DIRTY] != 0.0:
+            now[b, DIRTY] = 0.0
+            for j in range(balls):
+                memory.missing[b, j] = 0.0

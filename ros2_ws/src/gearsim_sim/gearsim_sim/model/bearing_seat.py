@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.model.ball_bearing import BallBearing
+from gearsim_sim.model.bearing_faults import BearingTerm, SurfaceProfile, Term
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.ring import Ring
+from gearsim_sim.model.rolling_bearing import RollingBearing
 from gearsim_sim.model.spall import Spall
 
 Faults = tuple[tuple[Contribution, float], ...]
@@ -22,10 +23,11 @@ class BearingSeat:
     """A bearing between two bodies; its interfaces are where the inner ring is in the outer."""
 
     name: str
-    law: BallBearing
+    law: RollingBearing
     x: int  # index of the interface
     y: int
     cage: int  # track, signed counter-clockwise
+    spin: int  # track of the balls' turning about themselves, relative to the cage
     inner: Ring
     outer: Ring
     nominal_stiffness_n_per_m: float
@@ -35,18 +37,17 @@ class BearingSeat:
         return 2 * math.pi * float(phases[self.cage])
 
     def missing(self, phases: Array, faults: Faults) -> Array:
-        """What the races lack under each ball because of faults [m]; shape (balls,)."""
-        law = self.law
-        missing = np.zeros(law.ball_count)
-        azimuths = law.azimuths_rad + self.cage_angle_rad(phases)
-        for spall, severity in faults:
-            if not isinstance(spall, Spall):
-                continue
-            middle = spall.position_rad + 2 * math.pi * spall.ring.angle_turns(phases)
-            first = spall.row * law.balls_per_row
-            for ball in range(first, first + law.balls_per_row):
-                offset = math.remainder(azimuths[ball] - middle, 2 * math.pi)
-                missing[ball] += severity * spall.drop(offset)
+        """What surfaces lack under each ball because of faults, and added clearance [m]; shape (balls,).
+
+        Slip and oil films have a memory and exist in the compiled loop only.
+        """
+        missing = np.zeros(self.law.ball_count)
+        cage = self.cage_angle_rad(phases)
+        for one, severity in faults:
+            if isinstance(one, Spall | SurfaceProfile):
+                missing += severity * one.missing(self.law, cage, phases)
+            elif isinstance(one, BearingTerm) and one.what is Term.CLEARANCE:
+                missing += severity * one.values[0]
         return missing
 
     def force(self, displacement_m: Array, phases: Array, faults: Faults = ()) -> Array:

@@ -9,19 +9,52 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from gearsim_sim.integrate.compiled import compiled, inlined
 from gearsim_sim.integrate.kernel import correct, interface_motion, predict, site_accelerations, state_row
 from gearsim_sim.integrate.pieces import cosine_sine
+from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, NOW_COLUMNS, rest_terms
 from gearsim_sim.model.bearing_loop import bearing_forces
 from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_motion
-from gearsim_sim.model.loop_data import Array, Data, Drive, Part
+from gearsim_sim.model.loop_data import Array, BearingMemory, Data, Drive, Part
 from gearsim_sim.model.mesh_loop import WORK_COLUMNS, mesh_forces
 
 # Columns of `motion` before the state rows of both parts: turns since the anchor, speed.
 MOTION_COLUMNS = 2
+
+
+class Work(NamedTuple):
+    """Work space of the loop, which allocates nothing itself."""
+
+    q: Array  # (interfaces,) displacements
+    rates: Array
+    forces: Array
+    known0: Array  # (sites of the part,) accelerations by known inputs
+    known1: Array
+    inputs: Array  # (known inputs,)
+    phases: Array  # (tracks,)
+    now: Array  # (bearings, NOW_COLUMNS)
+    jumps: Array  # (spalls, JUMP_COLUMNS)
+    meshes: Array  # (meshes, WORK_COLUMNS)
+
+
+def make_work(data: Data, drive: Drive, interfaces: int) -> Work:
+    """Work space for these numbers of things, all zero."""
+    return Work(
+        q=np.zeros(interfaces),
+        rates=np.zeros(interfaces),
+        forces=np.zeros(interfaces),
+        known0=np.zeros(data.first.site_index.size),
+        known1=np.zeros(data.second.site_index.size),
+        inputs=np.zeros(data.first.left_known.shape[0]),
+        phases=np.zeros(drive.rates.size),
+        now=np.zeros((data.bearings.index.shape[0], NOW_COLUMNS)),
+        jumps=np.zeros((drive.spalls.shape[0], JUMP_COLUMNS)),
+        meshes=np.zeros((data.meshes.index.shape[0], WORK_COLUMNS)),
+    )
 
 
 @inlined
@@ -70,7 +103,8 @@ def make_loop(
     q0_count, q1_count = (1 + rated) * i0, (1 + rated) * i1
 
     def run(
-        s0: Array, s1: Array, data: Data, drive: Drive, missing: Array, first: int, count: int,
+        s0: Array, s1: Array, data: Data, drive: Drive, memory: BearingMemory, work: Work,
+        first: int, count: int,
         accel: Array, column: int, motion: Array,
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
@@ -78,15 +112,10 @@ def make_loop(
         accel (site rows, columns) gets `count` columns from `column` on. `motion` (samples,
         MOTION_COLUMNS + state rows of both parts + interfaces) gets a row at each output sample.
         """
-        q = np.zeros(i0 + i1)
-        rates = np.zeros(i0 + i1)
-        forces = np.zeros(i0 + i1)
-        known0 = np.zeros(data.first.site_index.size)
-        known1 = np.zeros(data.second.site_index.size)
-        inputs = np.zeros(data.first.left_known.shape[0])
-        phases = np.zeros(drive.rates.size)
-        touched = np.zeros((drive.spalls.shape[0], 2), dtype=np.int64)
-        work = np.zeros((data.meshes.index.shape[0], WORK_COLUMNS))
+        q, rates, forces, phases = work.q, work.rates, work.forces, work.phases
+        known0, known1, inputs = work.known0, work.known1, work.inputs
+        now, jumps, meshes = work.now, work.jumps, work.meshes
+        rest_terms(memory, now)
         per_step = 1.0 / drive.length_steps
         per_second = per_step / data.step_s
         anchor, _, _ = reference_motion(drive.anchor_step, drive, per_step, per_second)
@@ -115,9 +144,10 @@ def make_loop(
             for j in range(rated * i1):
                 rates[i0 + j] = s1[q1 + i1 + j]
             bearing_forces(
-                step, q, rates, phases, drive, data.bearings, data.circle, missing, touched, forces, balls
-            )
-            mesh_forces(step, q, rates, phases, speed, drive, data.meshes, work, forces)
+                step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
+                data.step_s, balls,
+            )  # fmt: skip
+            mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
             correct(s0, data.first.k, forces, 0, n0, i0)
             correct(s1, data.second.k, forces, i0, n1, i1)
             for j in range(accel.shape[0]):
@@ -141,4 +171,4 @@ def make_loop(
                 samples += 1
         return samples
 
-    return compiled(run)
+    return compiled(run, allocates=False)

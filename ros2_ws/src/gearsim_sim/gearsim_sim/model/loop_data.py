@@ -35,8 +35,25 @@ class Bearings(NamedTuple):
     numbers: Array  # (bearings, 3): load factor, clearance, nominal stiffness
     cosines: Array  # (bearings, balls) of the azimuths in the cage's frame
     sines: Array
+    azimuths: Array  # (bearings, balls) in turns
     row_offsets: Array  # (bearings, rows) azimuth of the first ball of each row in turns
     balls_per_row: Indices  # (bearings,)
+    rollers: Indices  # (bearings,) 1: line contacts
+    spins: Indices  # (bearings,) track of the balls' spin
+
+
+class BearingMemory(NamedTuple):
+    """What the bearings remember from step to step, and work space.
+
+    `missing` is zero between steps; the others matter only while a fault uses them.
+    """
+
+    missing: Array  # (bearings, balls) what surfaces lack under each ball [m]
+    play: Array  # (bearings, balls) way of each ball out of the middle of its pocket [turns]
+    cosines: Array  # (bearings, balls) of azimuths with that play
+    sines: Array
+    film: Array  # (bearings, balls) thickness of the oil film over that under 1 N
+    cage: Array  # (bearings, 4) what cage and balls have fallen behind, way of the cage [turns], force [N]
 
 
 class Meshes(NamedTuple):
@@ -86,6 +103,8 @@ class Drive(NamedTuple):
     rates: Array  # (tracks,) turns per turn of the reference shaft
     need_rates: int  # 1: some element wants the rates of the interfaces
     spalls: Array
+    profiles: Array
+    bearing_terms: Array
     mesh_mods: Array
     mesh_pulses: Array
     mesh_terms: Array
@@ -96,9 +115,14 @@ class Drive(NamedTuple):
 # contributions with samples: where these begin in `Drive.samples`, and how many intervals they have.
 COLUMNS = {
     "spalls": (
-        "bearing", "row", "track", "sense", "on_inner_race", "position_turns", "half_width_rad", "depth_m",
-        "race_radius_m", "ball_radius_m",
+        "bearing", "row", "ball", "track", "sense", "position_turns", "half_width_rad", "depth_m",
+        "carrier_radius_m", "other_radius_m", "carrier_sign", "other_sign", "rectangular",
     ),
+    "profiles": (
+        "bearing", "first_ball", "balls", "track", "sense", "on_ball", "start_turns", "span_turns",
+        "offset", "points",
+    ),
+    "bearing_terms": ("bearing", "what", "first", "second", "third", "fourth", "fifth"),
     "mesh_mods": ("mesh", "what", "track", "offset", "points"),
     "mesh_pulses": ("mesh", "what", "track", "start_turns", "width_turns", "height"),
     "mesh_terms": ("mesh", "what", "value_m"),

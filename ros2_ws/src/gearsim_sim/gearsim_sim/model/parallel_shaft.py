@@ -79,14 +79,14 @@ def _coupling(end: TorsionalEnd, first: str, second: str) -> StateRow:
 
 
 def _tracks(params: ParallelParams, laws: tuple[BallBearing, ...]) -> tuple[Track, ...]:
-    """Both shafts, turning positively, then the cages, counter-clockwise."""
+    """Both shafts, turning positively, then the cages and the spin of their balls, counter-clockwise."""
     ratios = (1.0, params.speed_ratio)
     shafts = (Track(params.input_shaft, ratios[INPUT]), Track(params.output_shaft, ratios[OUTPUT]))
-    cages = (
-        Track(f"{name} cage", SENSE[shaft] * law.cage_ratio * ratios[shaft])
-        for name, shaft, law in zip(BEARINGS, BEARING_SHAFT, laws, strict=True)
-    )
-    return (*shafts, *cages)
+    inner = [SENSE[shaft] * ratios[shaft] for shaft in BEARING_SHAFT]
+    named = list(zip(BEARINGS, laws, inner, strict=True))
+    cages = (Track(f"{name} cage", law.cage_rate(rate)) for name, law, rate in named)
+    spins = (Track(f"{name} spin", law.spin_rate(rate)) for name, law, rate in named)
+    return (*shafts, *cages, *spins)
 
 
 def _mesh(params: ParallelParams, system: LinearSystem, seed: int) -> Mesh:
@@ -128,6 +128,7 @@ def _seat(params: ParallelParams, system: LinearSystem, number: int, law: BallBe
         x=system.interface_names.index(f"b{number + 1}_x"),
         y=system.interface_names.index(f"b{number + 1}_y"),
         cage=2 + number,
+        spin=2 + len(BEARINGS) + number,
         inner=Ring(shaft, SENSE[shaft]),
         outer=Ring(),
         nominal_stiffness_n_per_m=params.model.ball_bearing.nominal_stiffness_n_per_m,

@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_sim.integrate.coefficients import padded
-from gearsim_sim.model.loop_data import Bearings, Meshes
+from gearsim_sim.model.bearing_fault_loop import CAGE_COLUMNS
+from gearsim_sim.model.hertz import LINE_EXPONENT
+from gearsim_sim.model.loop_data import BearingMemory, Bearings, Meshes
+from gearsim_sim.model.oil_film import LINE_LOAD_POWER, POINT_LOAD_POWER
 from gearsim_sim.model.periodic import PeriodicSeries
 from gearsim_sim.model.plant import Plant
 
@@ -16,12 +19,13 @@ def bearing_data(plant: Plant, place: NDArray[np.int64]) -> Bearings:
     seats = plant.bearings
     balls = padded(max((seat.law.ball_count for seat in seats), default=0))
     rows = max((seat.law.rows for seat in seats), default=0)
-    cosines, sines = np.zeros((2, len(seats), balls))
+    cosines, sines, azimuths = np.zeros((3, len(seats), balls))
     offsets = np.zeros((len(seats), rows))
     for i, seat in enumerate(seats):
         law = seat.law
         cosines[i, : law.ball_count] = np.cos(law.azimuths_rad)
         sines[i, : law.ball_count] = np.sin(law.azimuths_rad)
+        azimuths[i, : law.ball_count] = law.azimuths_rad / (2 * np.pi)
         offsets[i, : law.rows] = law.azimuths_rad[:: law.balls_per_row] / (2 * np.pi)
     index = [[place[seat.x], place[seat.y], seat.cage] for seat in seats]
     numbers = [[seat.law.load_factor, seat.law.clearance_m, seat.nominal_stiffness_n_per_m] for seat in seats]
@@ -30,9 +34,21 @@ def bearing_data(plant: Plant, place: NDArray[np.int64]) -> Bearings:
         numbers=np.array(numbers, dtype=np.float64).reshape(-1, 3),
         cosines=cosines,
         sines=sines,
+        azimuths=azimuths,
         row_offsets=offsets,
         balls_per_row=np.array([seat.law.balls_per_row for seat in seats], dtype=np.int64),
+        rollers=np.array([seat.law.exponent == LINE_EXPONENT for seat in seats], dtype=np.int64),
+        spins=np.array([seat.spin for seat in seats], dtype=np.int64),
     )
+
+
+def bearing_memory(bearings: Bearings) -> BearingMemory:
+    """Bearings that have not moved yet; films begin as under 100 N."""
+    shape = bearings.cosines.shape
+    missing, play, cosines, sines, film = np.zeros((5, *shape))
+    for i in range(shape[0]):
+        film[i] = 100.0 ** (-1 / (LINE_LOAD_POWER if bearings.rollers[i] else POINT_LOAD_POWER))
+    return BearingMemory(missing, play, cosines, sines, film, np.zeros((shape[0], CAGE_COLUMNS)))
 
 
 def mesh_data(plant: Plant, place: NDArray[np.int64], step_s: float) -> Meshes:

@@ -18,3 +18,7 @@ class Ring:
     def angle_turns(self, phases: NDArray[np.float64]) -> float:
         """Its azimuth in turns, counter-clockwise."""
         return self.sense * float(phases[self.track])
+
+    def rate(self, rates: NDArray[np.float64]) -> float:
+        """Its turns per turn of the reference shaft, counter-clockwise."""
+        return self.sense * float(rates[self.track])

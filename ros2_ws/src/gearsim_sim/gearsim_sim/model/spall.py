@@ -1,15 +1,4 @@
-"""Localised spalls of bearing races: the path of a ball across a pit, thesis Figure 4.4 (b).
-
-While a ball crosses the pit, it first rolls over the entry edge, then over the exit edge: its centre
-moves on circles of the ball's radius about the two edges. Half-way through it changes over, and the
-direction of its motion changes at once: the impact. With beta the angle between the ball and the nearer
-edge, seen from the bearing's axis, and R the race's radius, the centre lies by
-
-    drop = r - sqrt(r^2 - (R sin beta)^2) -/+ R (1 - cos beta)       (- outer race, + inner race)
-
-off its ordinary path. At half the width this is the greatest depth that the ball can reach. A pit
-shallower than that carries the ball on its floor in between. Severity scales the drop as a whole.
-"""
+"""Localised pits of races and rolling elements in their place; see `pit` for their shapes."""
 
 from __future__ import annotations
 
@@ -17,60 +6,89 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_sim.model.pit import Edge, race_edge, rounded_drop
 from gearsim_sim.model.ring import Ring
+from gearsim_sim.model.rolling_bearing import RollingBearing
+
+Array = NDArray[np.float64]
+ON_RACE = -1  # in place of the number of a ball
 
 
 @dataclass(frozen=True, slots=True)
 class Spall:
-    """A spall in place: geometry that the contact model needs."""
+    """A localised pit in a race, crossed by one ball of a row at a time, or in one ball.
+
+    `ring` is what the pit turns with: a ring of the bearing, or (sense 1) the track of the balls' spin. A pit
+    of a ball meets one race when the spin's angle and `position_rad` make whole turns; what it does at the
+    other race is a second row, half a turn off.
+    """
 
     table: ClassVar[str] = "spalls"
 
     bearing: int  # index of its seat in the plant
     row: int  # from 0
-    on_inner_race: bool
-    ring: Ring  # what it turns with
+    ball: int  # of all balls of the bearing, or ON_RACE
+    ring: Ring
     position_rad: float  # middle of the pit, at angle zero of the ring
     half_width_rad: float
     depth_m: float
-    race_radius_m: float
-    ball_radius_m: float
+    edge: Edge
+    rectangular: bool = False
 
     def drop(self, offset_rad: float) -> float:
-        """How much the race is away under a ball `offset_rad` from the middle of the pit [m]."""
-        beta = self.half_width_rad - abs(offset_rad)
-        if beta <= 0:
-            return 0.0
-        return min(self.depth_m, edge_drop(beta, self))
+        """How much is missing `offset_rad` from the middle of the pit [m]."""
+        if self.rectangular:
+            return self.depth_m if abs(offset_rad) < self.half_width_rad else 0.0
+        return rounded_drop(offset_rad, self.half_width_rad, self.depth_m, self.edge)
+
+    def missing(self, law: RollingBearing, cage_rad: float, phases: Array) -> Array:
+        """What is missing under each ball [m]; shape (balls,)."""
+        middle = self.position_rad + 2 * math.pi * self.ring.angle_turns(phases)
+        missing = np.zeros(law.ball_count)
+        if self.ball != ON_RACE:
+            missing[self.ball] = self.drop(math.remainder(middle, 2 * math.pi))
+            return missing
+        first = self.row * law.balls_per_row
+        for ball in range(first, first + law.balls_per_row):
+            offset = math.remainder(law.azimuths_rad[ball] + cage_rad - middle, 2 * math.pi)
+            missing[ball] = self.drop(offset)
+        return missing
+
+    @property
+    def on_inner_race(self) -> bool:
+        """Whether it is a pit of the inner race."""
+        return self.ball == ON_RACE and self.edge.carrier_sign > 0
+
+    @property
+    def race_radius_m(self) -> float:
+        """Radius of the race that has the pit, or meets it."""
+        edge = self.edge
+        return edge.carrier_radius_m if self.ball == ON_RACE else edge.other_radius_m
 
     def numbers(self) -> tuple[float, ...]:
         """The columns of the table `spalls`."""
         return (
             self.bearing,
             self.row,
+            self.ball,
             self.ring.track,
             self.ring.sense,
-            self.on_inner_race,
             self.position_rad / (2 * math.pi),
             self.half_width_rad,
             self.depth_m,
-            self.race_radius_m,
-            self.ball_radius_m,
+            self.edge.carrier_radius_m,
+            self.edge.other_radius_m,
+            self.edge.carrier_sign,
+            self.edge.other_sign,
+            self.rectangular,
         )
 
     def samples(self) -> None:
         """A pit needs no table."""
         return
-
-
-def edge_drop(beta_rad: float, spall: Spall) -> float:
-    """Drop of a ball that has rolled `beta_rad` past the edge, for severity 1 [m]."""
-    return reachable_depth(
-        2 * beta_rad * spall.race_radius_m,
-        race_radius_m=spall.race_radius_m,
-        ball_radius_m=spall.ball_radius_m,
-        on_inner_race=spall.on_inner_race,
-    )
 
 
 def reachable_depth(
@@ -81,8 +99,4 @@ def reachable_depth(
     For the Koyo 1205 and 0.8 mm: 19.0 um on the outer and 27.6 um on the inner race (thesis 5.3.2 and
     5.3.3: 19.1 and 27.6 um).
     """
-    beta = width_m / (2 * race_radius_m)
-    chord = race_radius_m * math.sin(beta)
-    ball = ball_radius_m - math.sqrt(ball_radius_m**2 - chord**2)
-    race = 2 * race_radius_m * math.sin(beta / 2) ** 2
-    return ball + race if on_inner_race else ball - race
+    return race_edge(race_radius_m, ball_radius_m, inner=on_inner_race).drop(width_m / (2 * race_radius_m))

@@ -74,7 +74,7 @@ def rough_series(
 
 
 def waviness_series(
-    orders: tuple[int, ...], amplitudes_m: tuple[float, ...], phases_rad: Array
+    orders: tuple[float, ...], amplitudes_m: tuple[float, ...], phases_rad: Array
 ) -> PeriodicSeries:
     """Lobes of a race or ball: amplitude cos(order * angle + phase)."""
     amplitudes = np.asarray(amplitudes_m)

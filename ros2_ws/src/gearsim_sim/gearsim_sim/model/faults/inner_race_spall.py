@@ -1,7 +1,8 @@
-"""Localised spall of the inner race: turns with the shaft, in and out of the load zone (4.13)."""
+"""Localised spall of the inner race: turns with it, in and out of the load zone (4.13)."""
 
 from __future__ import annotations
 
+from gearsim_sim.model.faults.bearing_parts import Race
 from gearsim_sim.model.faults.kind import FaultKind, bearing_names
 from gearsim_sim.model.faults.spall import SpallParams, place_spall
 from gearsim_sim.model.plant import Plant
@@ -9,11 +10,8 @@ from gearsim_sim.model.spall import Spall
 
 
 def place(params: SpallParams, component: str, plant: Plant, seed: int) -> tuple[Spall]:  # noqa: ARG001
-    """The spall; `position_rad` is its azimuth at shaft angle zero (default 0)."""
-    index = bearing_names(plant).index(component)
-    seat = plant.bearings[index]
-    position = 0.0 if params.position_rad is None else params.position_rad
-    return (place_spall(params, seat, index, position, inner=True),)
+    """The spall; `position_rad` is its azimuth at angle zero of the ring (default 0 on a ring that turns)."""
+    return (place_spall(params, component, plant, Race.INNER),)
 
 
 KIND = FaultKind(

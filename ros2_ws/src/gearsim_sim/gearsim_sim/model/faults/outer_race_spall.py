@@ -1,7 +1,8 @@
-"""Localised spall of the outer race: stands still, by default in the middle of the load zone."""
+"""Localised spall of the outer race: where that stands still, by default in the middle of the load zone."""
 
 from __future__ import annotations
 
+from gearsim_sim.model.faults.bearing_parts import Race
 from gearsim_sim.model.faults.kind import FaultKind, bearing_names
 from gearsim_sim.model.faults.spall import SpallParams, place_spall
 from gearsim_sim.model.plant import Plant
@@ -10,10 +11,7 @@ from gearsim_sim.model.spall import Spall
 
 def place(params: SpallParams, component: str, plant: Plant, seed: int) -> tuple[Spall]:  # noqa: ARG001
     """The spall; `position_rad` is its azimuth at angle zero of the ring (0 along x, pi/2 along y)."""
-    index = bearing_names(plant).index(component)
-    seat = plant.bearings[index]
-    position = seat.law.load_direction_rad if params.position_rad is None else params.position_rad
-    return (place_spall(params, seat, index, position, inner=False),)
+    return (place_spall(params, component, plant, Race.OUTER),)
 
 
 KIND = FaultKind(

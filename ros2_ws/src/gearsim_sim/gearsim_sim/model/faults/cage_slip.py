@@ -1,0 +1,57 @@
+"""Slip of the cage: BPFO, BPFI and FTF off their kinematic values, and not quite periodic (thesis 8.2.1)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from gearsim_sim.model.bearing_faults import BearingTerm, Term
+from gearsim_sim.model.cage_slip import jitter_key
+from gearsim_sim.model.faults.bearing_parts import find_seat
+from gearsim_sim.model.faults.kind import FaultKind, bearing_names
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.params.fields import SiKeyed, Strict
+
+_NEVER_HALVED_N = 1e12
+
+
+class CageSlipParams(Strict):
+    """See `gearsim_sim.model.cage_slip`; `pocket_play_rad` is seen from the bearing's axis.
+
+    Without `halving_force_n` the slip does not depend on the load.
+    """
+
+    slip: Annotated[float, SiKeyed("", ge=0, le=0.5)] = 0.01
+    halving_force_n: Annotated[float, SiKeyed("N", gt=0)] | None = None
+    jitter_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.5)] = 0.01
+    pocket_play_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.1)] = 0.005
+    knot_turns: Annotated[float, SiKeyed("", gt=0, le=100)] = 0.3
+    walk: Annotated[float, SiKeyed("", ge=0, le=1)] = 0.0
+
+
+def place(params: CageSlipParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm, ...]:
+    """Slip, jitter of the cage, and play of the elements, each if there is any."""
+    index, _ = find_seat(plant, component)
+    knots = 1 / params.knot_turns
+    terms = []
+    if params.slip > 0:
+        halving = params.halving_force_n or _NEVER_HALVED_N
+        key = jitter_key(seed, f"{component}/slip")
+        terms.append(BearingTerm(index, Term.SLIP, (params.slip, halving, params.walk, knots, key)))
+    for what, amplitude, name in (
+        (Term.CAGE_JITTER, params.jitter_rad, "jitter"),
+        (Term.POCKET_PLAY, params.pocket_play_rad, "play"),
+    ):
+        if amplitude > 0:
+            turns = amplitude / (2 * math.pi)
+            terms.append(BearingTerm(index, what, (turns, knots, jitter_key(seed, f"{component}/{name}"))))
+    return tuple(terms)
+
+
+KIND = FaultKind(
+    name="cage_slip",
+    summary="cage slower than its kinematic speed, with bounded random jitter of cage and elements",
+    params_model=CageSlipParams,
+    components=bearing_names,
+    place=place,
+)
