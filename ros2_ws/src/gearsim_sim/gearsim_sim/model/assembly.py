@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 Vector = Mapping[str, float]
 """A direction in the space of the degrees of freedom: name -> coefficient."""
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Linear springs or dampers one by one: each acts on the elongation `directions[:, i]` . x."""
+
+    directions: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  # (n, elements)
+    values: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))  # (elements,)
+
+    def doubled_energy(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sum of value * elongation^2 for motions (n, times): twice the energy, or the power of dampers."""
+        return np.asarray(self.values @ (self.directions.T @ motion) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +40,8 @@ class LinearSystem:
     interfaces: NDArray[np.float64]  # W, (n, interfaces)
     input_names: tuple[str, ...]
     inputs: NDArray[np.float64]  # U, (n, inputs)
+    springs: Elements = field(default_factory=Elements)  # what K is made of; a `part` does not carry them
+    dampers: Elements = field(default_factory=Elements)  # what C is made of
 
     def dof(self, name: str) -> int:
         """Index of a degree of freedom; ValueError if there is none of that name."""
@@ -119,6 +133,10 @@ class Assembly:
                 result += value * np.outer(column, column)
             return result
 
+        def elements(found: list[tuple[Vector, float]]) -> Elements:
+            directions = np.array([array(vector) for vector, _ in found]).reshape(-1, len(names)).T
+            return Elements(directions, np.array([value for _, value in found]))
+
         def columns(directions: Mapping[str, Vector]) -> NDArray[np.float64]:
             return np.array([array(vector) for vector in directions.values()]).reshape(-1, len(names)).T
 
@@ -131,4 +149,6 @@ class Assembly:
             interfaces=columns(self._interfaces),
             input_names=tuple(self._inputs),
             inputs=columns(self._inputs),
+            springs=elements(self._springs),
+            dampers=elements(self._dampers),
         )
