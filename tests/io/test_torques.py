@@ -61,6 +61,14 @@ def test_the_torque_of_a_stretch_without_gaps(tmp_path, record):
     np.testing.assert_array_equal(back.torques.data_nm, record.torques.data_nm[:, 2560:])
 
 
+def test_batches_of_another_size_are_cut_to_the_stretch(tmp_path, record):
+    samples = [b for b in objects_of(record) if isinstance(b, SampleBatch) and b.first_sample != 2048]
+    torques = [b for b in objects_of(record, 700) if isinstance(b, TorqueBatch)]
+    back = read_record(_bag(tmp_path / "bag", samples + torques))
+    assert back.first_sample == 2560
+    np.testing.assert_array_equal(back.torques.data_nm, record.torques.data_nm[:, 2560:])
+
+
 def test_a_torque_with_a_hole_is_left_out_and_noted(tmp_path, record):
     batches = [b for b in objects_of(record) if not (isinstance(b, TorqueBatch) and b.first_sample == 2048)]
     back = read_record(_bag(tmp_path / "bag", batches))

@@ -102,10 +102,10 @@ def test_mains_lines_have_their_amplitudes_and_one_phase_for_all_channels():
 
 
 def test_mains_phase_is_exact_after_days():
-    clock = PhaseClock(50.0, 65536.0)
-    day = 86400 * 65536
+    clock = PhaseClock(50.0, 48_000.0)  # 50 / 48000 is no binary fraction
+    day = 86400 * 48_000
     turns = clock.turns(3 * day + 12_345, 40_000)
-    exact = np.array([(50 * (3 * day + 12_345 + k)) % 65536 for k in (0, 39_999)]) / 65536
+    exact = np.array([(50 * (3 * day + 12_345 + k)) % 48_000 for k in (0, 39_999)]) / 48_000
     np.testing.assert_allclose(np.mod(turns[[0, -1]], 1.0), exact, rtol=0, atol=1e-12)
 
 

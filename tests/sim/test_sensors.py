@@ -12,6 +12,7 @@ from gearsim_io.quantities import validate
 from gearsim_sim.sensors.chain import STAGES, MeasuringChain
 from gearsim_sim.sensors.delay import Delay, taps
 from gearsim_sim.sensors.draws import generator, normal
+from gearsim_sim.sensors.mounting import mountings
 from gearsim_sim.sensors.rolloff import lowpass
 from gearsim_sim.sensors.rows import Row
 from gearsim_sim.sensors.settings import SensorsModel, chains
@@ -211,6 +212,56 @@ def test_a_scenario_changes_all_or_one():
     assert table.encoders == ()
 
 
+def test_sections_are_replaced_as_a_whole_and_switched_off():
+    table = _table(
+        {
+            "accelerometers": {
+                "chain": "magnet",
+                "all": {"high_pass": {"corner": "2 Hz", "order": 2}},
+                "each": {
+                    "p": {"mounting": "off", "mains": {"amplitude": "0.1 m/s^2"}},
+                    "q": {"mounting": "stud", "site": {"p": 0.6, "q": 0.8}, "cross_axis": {"p": 0.02}},
+                },
+            }
+        }
+    )
+    p, q = table.accelerometers
+    assert p.mounting is None
+    assert (p.mains.amplitude, p.mains.frequency) == (0.1, 50.0)
+    assert q.mounting == mountings()["stud"]
+    assert q.high_pass == p.high_pass
+    assert (p.high_pass.corner, p.high_pass.order) == (2.0, 2)
+    assert q.looks_at == (("p", 0.6), ("q", 0.8), ("p", 0.02))
+    assert p.looks_at == (("p", 1.0),)
+
+
+def test_pickups_are_for_all_shafts_or_one():
+    table = _table(
+        {
+            "tachos": {"shafts": ["input", "output"], "jitter": "2 us", "each": {"output": {"missing": 0.1}}},
+            "torques": {"shafts": ["output"], "each": {"output": {"range": "50 N*m"}}},
+        }
+    )
+    first, second = (tacho.pickup for tacho in table.tachos)
+    assert (first.jitter, first.missing) == (2e-6, 0.0)
+    assert (second.jitter, second.missing) == (2e-6, 0.1)
+    (torque,) = table.torques
+    assert (torque.channel, torque.site) == ("output_torque", "output_torque")
+    assert (torque.unit, torque.full_scale) == ("N*m", 50.0)
+
+
+@pytest.mark.parametrize("rate", [16_384.0, 65_536.0])
+@pytest.mark.parametrize("name", sorted(chains()))
+def test_every_shipped_chain_measures(name, rate):
+    table = _table({"accelerometers": {"chain": name}})
+    motion = np.tile(30 * np.sin(2 * np.pi * 100 * np.arange(20_000) / rate), (2, 1))
+    chain = MeasuringChain(table.accelerometers, ("p", "q"), rate, 1)
+    out = chain.process(motion, 0, 20_000)
+    for seen, moved in zip(out, motion, strict=True):
+        # 100 Hz comes through within the gain errors, dropouts and interference of the catalogue
+        assert np.linalg.lstsq(moved[:, None], seen, rcond=None)[0][0] == pytest.approx(1.0, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -230,6 +281,42 @@ def test_a_scenario_changes_all_or_one():
         ({"accelerometers": {"all": {"adc_bits": 12.5}}}, "whole number of adc_bits"),
         ({"tachos": {"shafts": ["rear"]}}, "sensors.tachos: shafts: got rear, expected one of input, output"),
         ({"encoders": {"lines": 0}}, "encoders.lines: got 0"),
+        (
+            {"accelerometers": {"all": {"mounting": "glue"}}},
+            "mounting: got glue, expected one of stud, wax, mica",
+        ),
+        (
+            {"accelerometers": {"all": {"mounting": {"q": 3}}}},
+            "mounting.resonance: got nothing, expected this key",
+        ),
+        (
+            {"accelerometers": {"all": {"mains": {"amplitude": "1 V"}}}},
+            r"mains.amplitude: got 1 V, .*\(not V\)",
+        ),
+        (
+            {"accelerometers": {"all": {"drift": {"rms": "1 m/s^2", "tau": 1}}}},
+            "no such key; one of rms, time",
+        ),
+        (
+            {"accelerometers": {"each": {"p": {"site": {"q": "x"}}}}},
+            "a site, or sites with their weights, such",
+        ),
+        ({"accelerometers": {"sampling": {"antialias": "none"}}}, "an oversampling of 2 or more"),
+        (
+            {"tachos": {"each": {"output": {"jitter": "1 us"}}}},
+            "tachos: each: got output, expected one of input",
+        ),
+        ({"tachos": {"each": {"input": {"jiter": "1 us"}}}}, "no such key; one of clock, coupling, delay"),
+        (
+            {"torques": {"shafts": ["rear"]}},
+            "sensors.torques: shafts: got rear, expected one of input, output",
+        ),
+        ({"torques": {"each": {"input": {}}}}, "torques: each: got input, expected one of no shaft"),
+        ({"torques": {"shafts": ["input"], "all": {"range": "1 m/s^2"}}}, r"a number in N\*m, > 0, or off"),
+        (
+            {"torques": {"shafts": ["input"], "all": {"temperature": "off"}}},
+            "zero_per_k of input_torque: got 0.02, expected a temperature beside it",
+        ),
         ({"microphones": {}}, "no such key; one of accelerometers, encoders, tachos, torques"),
     ],
 )

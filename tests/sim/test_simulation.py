@@ -11,6 +11,7 @@ from gearsim_io.errors import InputError
 from gearsim_io.messages import message_name, pure_types, to_msg
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.scenario import load_scenario
+from gearsim_sim.sensors.rows import Encoder
 from gearsim_sim.simulation import Simulation, simulate, to_record
 
 RATE = 16384.0
@@ -304,6 +305,19 @@ def test_sensors_that_work_faster_than_the_samples_come(tmp_path):
     again = [batch for n in portions for batch in simulation.advance(n)] + simulation.finish()
     assert_same(again, whole)
     assert [batch.channels for batch in whole[:6:5]] == [("b1_y", "b3_y", "slant"), ("input_torque",)]
+
+
+def test_angles_keep_their_time_when_sensors_work_faster(tmp_path):
+    scenario = _faulty(tmp_path)
+    clean = dataclasses.replace(
+        scenario.sensors, encoders=tuple(Encoder(row.shaft) for row in scenario.sensors.encoders)
+    )
+    double = FastDouble()
+    record = to_record(dataclasses.replace(scenario, sensors=clean), 0.5, model=double)
+    for number, encoder in enumerate(record.encoders):
+        edges = encoder.first_edge + np.arange(encoder.samples.size)
+        angle = double.angle_turns(4 * encoder.samples, number)
+        np.testing.assert_allclose(angle, edges / 900, rtol=0, atol=1e-8)
 
 
 def test_a_record_holds_the_torque_and_gives_its_batches(tmp_path):
