@@ -1,8 +1,8 @@
 """How scenarios write the sensor table, and the chains that are shipped.
 
-`catalogue.yaml` names measuring chains (`lab`, `ideal`, ...) with value, unit and source of each number.
-A scenario picks one and may change parts of it, for all channels or for one; `off` switches an effect off.
-An effect with several numbers (`mounting`, `mains`, ...) is replaced as a whole.
+The folder `catalogue` has a file per measuring chain (`lab`, `ideal`, ...) with value, unit and source of
+each number. A scenario picks one and may change parts of it, for all channels or for one; `off` switches an
+effect off. An effect with several numbers (`mounting`, `mains`, ...) is replaced as a whole.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from gearsim_sim.sensors.overload import Overload
 from gearsim_sim.sensors.rows import Mix
 from gearsim_sim.sensors.sampling import Sampling
 
-CATALOGUE = Path(__file__).parent / "catalogue.yaml"
+CATALOGUE = Path(__file__).parent / "catalogue"
 
 MaybeFloat = float | None
 Accel = Annotated[float, Si("m/s^2", ge=0)]
@@ -136,13 +136,6 @@ class TorqueChain(TorqueEffects):
     description: str = ""
 
 
-class Catalogue(Strict):
-    """The shipped chains by name."""
-
-    accelerometers: dict[str, AccelerometerChain]
-    torques: dict[str, TorqueChain]
-
-
 class AccelerometersModel(Strict):
     """The accelerometers of a scenario.
 
@@ -191,12 +184,20 @@ class SensorsModel(Strict):
     torques: TorquesModel = TorquesModel()
 
 
+_KINDS: Mapping[str, type[AccelerometerChain] | type[TorqueChain]] = {
+    "accelerometers": AccelerometerChain,
+    "torques": TorqueChain,
+}
+
+
+def chain_names(kind: str) -> tuple[str, ...]:
+    """Names of the shipped chains of a kind of sensor, `accelerometers` or `torques`."""
+    return tuple(sorted(path.stem for path in (CATALOGUE / kind).glob("*.yaml")))
+
+
 @cache
-def catalogue() -> Catalogue:
-    """The shipped chains."""
-    return load_yaml(Catalogue, CATALOGUE, require_source=True)
-
-
-def chains() -> Mapping[str, AccelerometerChain]:
-    """The shipped chains of accelerometers by name."""
-    return catalogue().accelerometers
+def chain(kind: str, name: str) -> AccelerometerChain | TorqueChain:
+    """A shipped chain; KeyError if there is none of that name."""
+    if name not in chain_names(kind):
+        raise KeyError(name)
+    return load_yaml(_KINDS[kind], CATALOGUE / kind / f"{name}.yaml", require_source=True)

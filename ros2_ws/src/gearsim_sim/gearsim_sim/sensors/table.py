@@ -5,23 +5,21 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TypeVar
 
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Channel, Machine
 from gearsim_sim.sensors.marks import Pickup
 from gearsim_sim.sensors.rows import Encoder, Row, SensorTable, Tacho
 from gearsim_sim.sensors.settings import (
-    AccelerometerChain,
     AccelerometersModel,
+    Effects,
     EncodersModel,
     SensorsModel,
     TachosModel,
     TorquesModel,
-    catalogue,
+    chain,
+    chain_names,
 )
-
-_T = TypeVar("_T")
 
 
 def torque_signal(shaft: str) -> str:
@@ -55,7 +53,7 @@ def sensor_table(model: SensorsModel, machine: Machine, where: str) -> SensorTab
 
 def _accelerometers(model: AccelerometersModel, machine: Machine, where: str) -> tuple[Row, ...]:
     place = "sensors.accelerometers"
-    chain = _chain(catalogue().accelerometers, model.chain, f"{place}.chain", where)
+    effects = _chain("accelerometers", model.chain, where)
     known = {channel.name: channel for channel in machine.channels}
     names = tuple(known) if model.channels is None else model.channels
     for name in (*names, *model.each):
@@ -69,15 +67,15 @@ def _accelerometers(model: AccelerometersModel, machine: Machine, where: str) ->
     extra = tuple(name for name in model.each if name not in names)
     if extra:
         raise InputError(where, f"{place}.each", extra[0], "a channel that is listed under channels")
-    rows = tuple(_row(name, known.get(name), model, chain) for name in names)
+    rows = tuple(_row(name, known.get(name), model, effects) for name in names)
     for row in rows:
         _check_row(row, place, where)
     return rows
 
 
-def _row(name: str, channel: Channel | None, model: AccelerometersModel, chain: AccelerometerChain) -> Row:
+def _row(name: str, channel: Channel | None, model: AccelerometersModel, effects: Effects) -> Row:
     row = Row(name, name, channel.axis if channel else "")
-    row = dataclasses.replace(row, **chain.given())
+    row = dataclasses.replace(row, **effects.given())
     if channel is not None and math.isfinite(channel.full_scale) and row.full_scale is not None:
         row = dataclasses.replace(row, full_scale=channel.full_scale)
     row = dataclasses.replace(row, **model.all.given())
@@ -93,23 +91,26 @@ def _row(name: str, channel: Channel | None, model: AccelerometersModel, chain: 
 
 def _torques(model: TorquesModel, machine: Machine, where: str) -> tuple[Row, ...]:
     place = "sensors.torques"
-    chain = _chain(catalogue().torques, model.chain, f"{place}.chain", where)
     shafts = _shafts(model.shafts, (), machine, f"{where}: {place}")
     _check_each(model.each, shafts, f"{where}: {place}")
+    if not shafts:
+        return ()
+    effects = _chain("torques", model.chain, where)
     rows = []
     for shaft in shafts:
         row = Row(torque_signal(shaft), torque_signal(shaft), unit="N*m")
         one = model.each[shaft].given() if shaft in model.each else {}
-        row = dataclasses.replace(row, **{**chain.given(), **model.all.given(), **one})
+        row = dataclasses.replace(row, **{**effects.given(), **model.all.given(), **one})
         _check_row(row, place, where)
         rows.append(row)
     return tuple(rows)
 
 
-def _chain(chains: Mapping[str, _T], name: str, field: str, where: str) -> _T:
-    if name not in chains:
-        raise InputError(where, field, name, "one of " + ", ".join(sorted(chains)))
-    return chains[name]
+def _chain(kind: str, name: str, where: str) -> Effects:
+    names = chain_names(kind)
+    if name not in names:
+        raise InputError(where, f"sensors.{kind}.chain", name, "one of " + ", ".join(names))
+    return chain(kind, name)
 
 
 def _check_row(row: Row, place: str, where: str) -> None:
