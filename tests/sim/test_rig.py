@@ -51,6 +51,31 @@ def test_portions_change_no_bit_and_a_live_run_is_replayed():
     assert list(_bits(healthy)) != list(_bits(batches))  # and something did happen
 
 
+def _upper_lines(sampling):
+    """Spectrum from 3 kHz to 0.44 of the sample rate, with a spall on bearing_3."""
+    accelerometers = {"chain": "ideal", "channels": ["b1_y", "b3_y"], "sampling": sampling}
+    spall = {"kind": "outer_race_spall", "component": "bearing_3", "params": {"width_m": "0.8 mm"}}
+    changes = {"oversampling": 8, "timeline": [], "faults": [spall]}
+    changes["sensors"] = {"accelerometers": accelerometers}
+    data = to_record(load_scenario("quick", changes), 1.0).data.astype(float)
+    return np.fft.rfft(data * np.hanning(data.shape[1]))[:, 3000 : round(0.44 * 16_384)]
+
+
+def _size(lines):
+    return np.sqrt(np.mean(np.abs(lines) ** 2, axis=1))
+
+
+def test_a_delta_sigma_converter_shows_what_the_model_gives_and_a_bare_one_folds():
+    """The same steps of integration, decimated by the model at once or by the converter in a second stage."""
+    model = _upper_lines({})
+    converter = _upper_lines({"oversampling": 2})
+    bare = _upper_lines({"oversampling": 2, "antialias": "none"})
+    # Both filters reject 80 dB at least; what could fold is no larger than what lies in the band.
+    assert np.all(_size(converter - model) < 1e-4 * _size(model))
+    # The kinks of the contact reach beyond half the rate: -35 dB of the band at the faulty bearing.
+    assert -45 < 20 * np.log10(_size(bare - model) / _size(model))[1] < -25
+
+
 def test_the_torque_is_the_load_and_swings_with_the_mesh():
     changes = {"sensors": {"torques": {"chain": "ideal", "shafts": ["input", "output"]}}}
     record = to_record(load_scenario("quick", changes), 1.0)

@@ -180,6 +180,7 @@ def test_no_overload_no_change():
 
 
 def test_portions_change_no_bit_of_any_effect():
+    assert all(build([_full("c")], RATE, 0).active for _, build in STAGES)
     motion = np.random.default_rng(0).standard_normal((2, 70_000)) * 20
     rows = [_full("c"), _full("d", dropouts=Dropouts(rate="20 Hz", shows="rail"), noise_corner_hz=None)]
     whole = run_chain(rows, motion)
