@@ -14,6 +14,9 @@ from gearsim_sim.engine import Engine
 from gearsim_sim.ensemble import Ensemble, Variant
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.integrate.vectors import LANES
+from gearsim_sim.lane_tables import TABLES
+from gearsim_sim.model.faults import REGISTRY
+from gearsim_sim.model.plants import make_plant
 from gearsim_sim.params import load_parallel_params
 
 RATE_HZ = 65536.0
@@ -66,6 +69,37 @@ def test_a_variant_is_what_the_engine_gives_to_rounding(variants, together, numb
     assert relative(together.speed_hz[number], alone.speed_hz) < 1e-12
     for name, signal in zip(together.signal_names, together.signals[number], strict=True):
         assert relative(signal, alone.signals[name]) < 1e-10
+
+
+def kinds(plant):
+    """Kinds of faults that an ensemble of this machine can have."""
+    for kind in REGISTRY.values():
+        for component in kind.components(plant)[:1]:
+            fault = kind.build(FaultSpec(kind.name, component, {}), plant)
+            if {one.table for one in fault.contributions} <= set(TABLES):
+                yield FaultSpec(kind.name, component, {}, 0.8, kind.name)
+
+
+def test_every_kind_of_fault_is_that_of_the_engine(params):
+    """One variant for each; 0.1 s, in which balls cross pits and all teeth of the pinion mesh."""
+    found = list(kinds(make_plant(params, 1)))
+    assert len(found) >= 2
+    together = Ensemble([Variant(params, 1, (spec,)) for spec in found], RATE_HZ).advance(6554)
+    healthy = Engine(params, 1, RATE_HZ).advance(6554).accel
+    for number, spec in enumerate(found):
+        alone = Engine(params, 1, RATE_HZ, 4, (spec,)).advance(6554).accel
+        assert relative(together.accel[number], alone) < 1e-9, spec.kind
+        assert relative(alone, healthy) > 1e-6, spec.kind  # the fault has been felt
+
+
+def test_other_kinds_of_faults_are_refused(params):
+    plant = make_plant(params, 1)
+    usable = {spec.kind for spec in kinds(plant)}
+    refused = [kind for kind in REGISTRY.values() if kind.components(plant) and kind.name not in usable]
+    for kind in refused:
+        spec = FaultSpec(kind.name, kind.components(plant)[0], {})
+        with pytest.raises(InputError, match="single engine"):
+            Ensemble([Variant(params, 1, (spec,))], RATE_HZ)
 
 
 def same(one, other):

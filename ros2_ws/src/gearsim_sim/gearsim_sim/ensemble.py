@@ -25,6 +25,7 @@ from gearsim_sim.integrate.vectors import LANES
 from gearsim_sim.lane_group import Lane, LaneGroup
 from gearsim_sim.lane_tables import TABLES, check_alike
 from gearsim_sim.model.faults import fault_kind
+from gearsim_sim.model.loop_data import NEED_RATES
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.plants import make_plant
 from gearsim_sim.stepper import Stepper
@@ -102,6 +103,7 @@ class Ensemble:
         self._sites = sites
         self._workers = workers
         self._next = 0
+        self._tables: set[str] = set()
         lanes = []
         for number, variant in enumerate(self.variants):
             check_numbers(variant.seed, sample_rate_hz, oversampling)
@@ -110,7 +112,10 @@ class Ensemble:
         self._lanes = tuple(lanes)
         order = _by_system([lane.plant for lane in lanes])
         self._members = [order[i : i + LANES] for i in range(0, len(order), LANES)]
-        self._groups = [LaneGroup([lanes[i] for i in own], self._steps) for own in self._members]
+        self._rates = bool(self._tables & set(NEED_RATES))
+        self._groups = [
+            LaneGroup([lanes[i] for i in own], self._steps, rates=self._rates) for own in self._members
+        ]
         self._each_group(LaneGroup.settle)
 
     def _lane(self, number: int, variant: Variant) -> Lane:
@@ -120,7 +125,7 @@ class Ensemble:
         speed_hz = timeline.checked_speed(limits.speed_hz if variant.speed_hz is None else variant.speed_hz)
         load_nm = timeline.checked_load(limits.load_nm if variant.load_nm is None else variant.load_nm)
         for spec in variant.faults:
-            _check_fault(number, spec, plant, variant.seed)
+            self._tables |= _check_fault(number, spec, plant, variant.seed)
         step_rate_hz = self.sample_rate_hz * self._steps
         schedule = first_schedule(
             plant, timeline, self._steps, step_rate_hz, speed_hz, load_nm, variant.faults
@@ -223,20 +228,23 @@ class Ensemble:
             raise InputError("ensemble", "variant", variant, f"0 to {len(self._lanes) - 1}")
         lane = self._lanes[variant]
         if isinstance(event, Inject):
-            _check_fault(variant, event.fault, lane.plant, self.variants[variant].seed)
+            tables = _check_fault(variant, event.fault, lane.plant, self.variants[variant].seed)
+            if not self._rates and tables & set(NEED_RATES):
+                expected = "another kind: this one must be in a variant from the start, if only at severity 0"
+                raise InputError("ensemble", "fault.kind", event.fault.kind, expected)
         sample = lane.timeline.add(event, self.earliest_event_sample)
         for group in self._groups:
             group.look_again()
         return sample
 
 
-def _check_fault(number: int, spec: FaultSpec, plant: Plant, seed: int) -> None:
-    """InputError for a fault that works by what the ensemble's loop does not have."""
-    fault = fault_kind(spec.kind).build(spec, plant, seed)
-    beyond = sorted({one.table for one in fault.contributions} - set(TABLES))
-    if beyond:
-        expected = "a fault of races, teeth or transmission error; others need the single engine"
+def _check_fault(number: int, spec: FaultSpec, plant: Plant, seed: int) -> set[str]:
+    """Tables of a fault; InputError for one that works by what the ensemble's loop does not have."""
+    tables = {one.table for one in fault_kind(spec.kind).build(spec, plant, seed).contributions}
+    if not tables <= set(TABLES):
+        expected = "a fault of bearings or teeth; others need the single engine"
         raise InputError("ensemble", f"variants.{number}.faults", spec.kind, expected)
+    return tables
 
 
 def _by_system(plants: Sequence[Plant]) -> list[int]:

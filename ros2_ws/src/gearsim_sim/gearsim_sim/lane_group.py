@@ -14,9 +14,10 @@ from gearsim_sim.integrate.lane_pieces import OUTPUTS, decimate_lanes, phase_tap
 from gearsim_sim.integrate.vectors import LANES
 from gearsim_sim.lane_pack import aligned, blocks_of, pack_part, pack_system
 from gearsim_sim.lane_tables import make_work, pack_drive, pack_elements
-from gearsim_sim.model.lane_data import LaneDrive
+from gearsim_sim.model.lane_data import LaneDrive, LaneMemory
 from gearsim_sim.model.lane_loop import MOTION_ROWS, make_lane_loop, spread_motion
 from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.plant_data import bearing_memory
 from gearsim_sim.schedule import REBASE_STEPS, Schedule
 from gearsim_sim.stepper import Stepper
 from gearsim_sim.timeline import Timeline
@@ -77,9 +78,11 @@ class LaneGroup:
         At most LANES; the last one is repeated to fill up.
     oversampling : int
         Steps per sample.
+    rates : bool
+        Whether the rates of the interfaces are worked out.
     """
 
-    def __init__(self, lanes: Sequence[Lane], oversampling: int) -> None:
+    def __init__(self, lanes: Sequence[Lane], oversampling: int, *, rates: bool) -> None:
         self.lanes = tuple(lanes)
         self._filled = [*lanes, *([lanes[-1]] * (LANES - len(lanes)))]
         self._steps = oversampling
@@ -90,7 +93,7 @@ class LaneGroup:
         rests += [rests[-1]] * (LANES - len(lanes))
         blocks = [max(blocks_of(own[p]) for own in setups) for p in range(len(setups[0]))]
         parts = [
-            [pack_part(setup, rest, blocks[p]) for p, setup in enumerate(own)]
+            [pack_part(setup, rest, blocks[p], rates=rates) for p, setup in enumerate(own)]
             for rest, own in zip(rests, setups, strict=True)
         ]
         self._system, self._state = pack_system(parts, setups[0])
@@ -101,7 +104,9 @@ class LaneGroup:
         given = np.concatenate([setup.state_rows for setup in setups[0]])
         self._rows = MOTION_ROWS + np.argsort(given)
         self._drive: LaneDrive | None = None
-        self._loop = make_lane_loop()
+        bearings = steppers[0].data.bearings
+        self._memory = LaneMemory.of([bearing_memory(bearings) for _ in range(LANES)])
+        self._loop = make_lane_loop(bearings.cosines.shape[1])
         self._taps, self._ranges = phase_taps(decimation_taps(oversampling), oversampling)
         self._width = (BLOCK_SAMPLES + 2 * HALF_LENGTH_SAMPLES + OUTPUTS) * oversampling
         self._accel = aligned(np.zeros((steppers[0].row_count * self._width, LANES)))
@@ -176,8 +181,10 @@ class LaneGroup:
             self._run(min(to_step, self._stop) - self._step, self._drive)
 
     def _change_drive(self) -> None:
-        self._drive = pack_drive([lane.schedule.drive() for lane in self._filled])
-        self._work = make_work(self._elements, self._drive, self._inputs)
+        drives = [lane.schedule.drive() for lane in self._filled]
+        self._drive = pack_drive(drives, self._elements, self._memory, len(self.lanes))
+        interfaces = self._state.forces.shape[0] // 3
+        self._work = make_work(self._elements, self._drive, self._inputs, interfaces)
         whole = np.array([lane.schedule.anchor_turns[self._tracks] for lane in self.lanes]).T.copy()
         self._angles = (self._drive.anchor_phases[self._tracks], self._drive.rates[self._tracks], whole)
 
@@ -185,7 +192,7 @@ class LaneGroup:
         out = np.empty(((count // self._steps + 1) * (MOTION_ROWS + self._rows.size), LANES))
         column = self._step + 1 - self._base
         used = self._loop(
-            self._system, self._state, self._elements, drive, self._work,
+            self._system, self._state, self._elements, drive, self._memory, self._work,
             self._step, count, self._accel, self._width, column, out,
         )  # fmt: skip
         self._step += count

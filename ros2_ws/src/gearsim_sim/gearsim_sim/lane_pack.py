@@ -21,6 +21,7 @@ from gearsim_sim.integrate.lane_kernel import (
     INTERFACES,
     KNOWN,
     KNOWN_ROWS,
+    MOTIONS,
     OUT_COMPLIANCE,
     OUT_ROWS,
     OUTPUTS,
@@ -50,7 +51,7 @@ def aligned(values: Array) -> Array:
 class LanePart:
     """Numbers of one lane and one part, flat, in the order of `LaneSystem` and `LaneState`."""
 
-    counts: tuple[int, int, int, int]  # blocks, interfaces, sites, outputs
+    counts: tuple[int, int, int, int, int]  # blocks, interfaces, their motions, sites, outputs
     step: Array
     compliance: Array
     out_rows: Array
@@ -71,7 +72,7 @@ class LanePart:
 _CONSTANTS = ("step", "compliance", "out_rows", "out_compliance", "known", "known_rows")
 
 
-def pack_part(setup: PartSetup, rest: Rest, blocks: int) -> LanePart:
+def pack_part(setup: PartSetup, rest: Rest, blocks: int, *, rates: bool) -> LanePart:
     """Scale the modes of a part so that c0 is one, and order its numbers by blocks of modes.
 
     Parameters
@@ -82,6 +83,8 @@ def pack_part(setup: PartSetup, rest: Rest, blocks: int) -> LanePart:
         Where it starts.
     blocks : int
         Blocks of modes, the most that a lane needs.
+    rates : bool
+        Whether the rates of the interfaces are wanted.
     """
     at_rest, forces, inputs = rest.x[setup.dofs], rest.forces[setup.interfaces], rest.inputs
     propagator = _propagator(setup)
@@ -92,12 +95,13 @@ def pack_part(setup: PartSetup, rest: Rest, blocks: int) -> LanePart:
     decay, weights = _complex(propagator.decay, size)[0], np.array(c) / c0
     left, known = _complex(propagator.left, size) * c0, _complex(propagator.left_known, size) * c0
     rows = np.conj(_complex(propagator.rows, size))  # stored with the sign of the imaginary part turned
-    rows = np.delete(rows, np.arange(propagator.interfaces, propagator.motions), axis=0)
-    compliance = propagator.compliance.reshape(propagator.row_count, -1)
-    compliance = np.delete(compliance, np.arange(propagator.interfaces, propagator.motions), axis=0)
+    motions = propagator.motions if rates else propagator.interfaces
+    kept = [i for i in range(propagator.row_count) if i < motions or i >= propagator.motions]
+    rows = rows[kept]
+    compliance = propagator.compliance.reshape(propagator.row_count, -1)[kept]
     outs = np.conj(_complex(setup.part.state_rows, size))
     known_rows = (np.concatenate([rows, outs]) @ known.T).real
-    known_rows[propagator.interfaces : len(rows)] += propagator.site_known
+    known_rows[motions : len(rows)] += propagator.site_known
     z = _complex(propagator.modal(at_rest, np.zeros_like(at_rest)), size)[0]
     force = left.T @ forces + known.T @ inputs
     u2 = weights[2] * force
@@ -106,7 +110,7 @@ def pack_part(setup: PartSetup, rest: Rest, blocks: int) -> LanePart:
     per_block = [_blocks(one, blocks) for one in (left, np.array([decay, *weights]), np.conj(rows))]
     history = np.array([predicted, u1, u2, known.T @ inputs])
     return LanePart(
-        counts=(blocks, propagator.interfaces, propagator.sites, len(outs)),
+        counts=(blocks, propagator.interfaces, motions, propagator.sites, len(outs)),
         step=np.concatenate(per_block, axis=1).ravel(),
         compliance=compliance.ravel(),
         out_rows=_blocks(np.conj(outs), blocks).transpose(1, 0, 2).ravel(),
@@ -159,7 +163,8 @@ def pack_system(
         return aligned(rows[:, 0] if shared else rows)
 
     forces = joined("forces")
-    known = np.zeros((sum(part.counts[1] + part.counts[2] + part.counts[3] for part in lanes[0]), len(lanes)))
+    known = np.zeros((sum(sum(part.counts[2:]) for part in lanes[0]), len(lanes)))
+    motions = sum(part.counts[2] for part in lanes[0])
     system = LaneSystem(
         layout=_layout([own[0] for own in parts]),
         site_index=np.concatenate([setup.part.site_index for setup in setups]),
@@ -170,7 +175,7 @@ def pack_system(
         forces=aligned(np.concatenate([forces, forces, forces])),
         sums=aligned(joined("sums")),
         known=aligned(known),
-        motion=aligned(np.zeros_like(forces)),
+        motion=aligned(np.zeros((motions, len(lanes)))),
     )
     return system, state
 
@@ -181,16 +186,16 @@ def _layout(parts: Sequence[LanePart]) -> NDArray[np.int64]:
     at = np.zeros(COLUMNS, dtype=np.int64)
     for row, part in zip(layout, parts, strict=True):
         row[:] = at
-        row[[BLOCKS, INTERFACES, SITES, OUTPUTS]] = part.counts
-        blocks, interfaces, sites, outputs = part.counts
+        row[[BLOCKS, INTERFACES, MOTIONS, SITES, OUTPUTS]] = part.counts
+        blocks, interfaces, motions, sites, outputs = part.counts
         at[FIRST_BLOCK] += blocks
         at[FIRST_INTERFACE] += interfaces
         at[FIRST_SITE] += sites
-        at[FIRST_SUM] += interfaces + sites
+        at[FIRST_SUM] += motions + sites
         at[STEP] += part.step.size
         at[COMPLIANCE] += part.compliance.size
         at[OUT_ROWS] += part.out_rows.size
         at[OUT_COMPLIANCE] += part.out_compliance.size
         at[KNOWN] += part.known.size
-        at[KNOWN_ROWS] += interfaces + sites + outputs
+        at[KNOWN_ROWS] += motions + sites + outputs
     return layout

@@ -10,21 +10,26 @@ from numpy.typing import NDArray
 from gearsim_io.errors import InputError
 from gearsim_sim.integrate.vectors import LANES
 from gearsim_sim.lane_pack import aligned
-from gearsim_sim.model.lane_data import LaneDrive, LaneElements, LaneWork
-from gearsim_sim.model.loop_data import COLUMNS, SEVERITY_COLUMNS, Data, Drive
+from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, LAG, NOW_COLUMNS, SPIN_LAG
+from gearsim_sim.model.lane_data import LaneDrive, LaneElements, LaneMemory, LaneWork
+from gearsim_sim.model.loop_data import COLUMNS, SEVERITY_COLUMNS, Data, Drive, Meshes
+from gearsim_sim.model.mesh_loop import WORK_COLUMNS
 from gearsim_sim.model.plant import Plant
 
 Array = NDArray[np.float64]
-# Tables of fault rows that the loop of the ensemble knows, and their columns that point into the samples.
-TABLES = ("spalls", "mesh_mods")
+Indices = NDArray[np.int64]
+# Tables of fault rows that the loop of the ensemble knows.
+TABLES = ("spalls", "profiles", "bearing_terms", "mesh_mods", "mesh_pulses", "mesh_terms")
+_OF_BEARINGS, _OF_MESHES = TABLES[:3], TABLES[3:]
+_RECTANGULAR = SEVERITY_COLUMNS + COLUMNS["spalls"].index("rectangular")
+_BALL = SEVERITY_COLUMNS + COLUMNS["spalls"].index("ball")
 
 
 def check_alike(number: int, data: Data, first: Data) -> None:
     """InputError unless variant `number` differs from the first one in physical numbers only."""
     bearings, meshes = data.bearings, data.meshes
     pairs = [
-        (getattr(bearings, name), getattr(first.bearings, name))
-        for name in ("index", "cosines", "sines", "row_offsets", "balls_per_row")
+        (own, getattr(first.bearings, name)) for name, own in bearings._asdict().items() if name != "numbers"
     ]
     pairs += [
         (meshes.index[:, [0, 1, 4, 5]], first.meshes.index[:, [0, 1, 4, 5]]),
@@ -39,20 +44,25 @@ def check_alike(number: int, data: Data, first: Data) -> None:
 def pack_elements(data: Sequence[Data], plant: Plant) -> LaneElements:
     """Constants of the force elements of all lanes; `plant` is that of any lane."""
     bearings, meshes = data[0].bearings, data[0].meshes
-    tables, places = _table_places(data)
+    tables, located = _located([one.meshes for one in data])
+    places = [np.concatenate([one.index[:, 2:4], one.errors[:, 1:3]]).ravel() for one in located]
     return LaneElements(
         bearings=bearings,
         bearing_numbers=_lanes(one.bearings.numbers.ravel() for one in data),
+        lane_bearings=np.array([one.bearings.numbers for one in data]),
         cosines=aligned(bearings.cosines.ravel()),
         sines=aligned(bearings.sines.ravel()),
         directions=np.array([seat.law.load_direction_rad / (2 * np.pi) for seat in plant.bearings]),
+        circle=data[0].circle,
         meshes=meshes,
-        mesh_numbers=_lanes(one.meshes.numbers.ravel() for one in data),
-        table_places=places,
+        mesh_numbers=_lanes(one.numbers.ravel() for one in located),
+        table_places=_lanes(places),
+        lane_index=np.array([one.index for one in located]),
+        lane_numbers=np.array([one.numbers for one in located]),
+        lane_errors=np.array([one.errors for one in located]),
         tables=tables,
         drive_numbers=_lanes(
-            np.array([one.inertia, 1 / one.torque_ratios[0], one.torque_ratios[1], one.gravity])
-            for one in data
+            [one.inertia, 1 / one.torque_ratios[0], one.torque_ratios[1], one.gravity] for one in data
         ),
         rotations=data[0].rotations,
         step_s=data[0].step_s,
@@ -60,64 +70,70 @@ def pack_elements(data: Sequence[Data], plant: Plant) -> LaneElements:
     )
 
 
-def _lanes(rows: Iterable[Sequence[float] | Array]) -> Array:
+def _lanes(rows: Iterable[Sequence[float] | Array | Indices]) -> Array:
     """One column for each lane."""
     return aligned(np.array(list(rows), dtype=np.float64).T)
 
 
-def _table_places(data: Sequence[Data]) -> tuple[Array, Array]:
-    """The tables of all lanes, each kept once, and where each lane's are."""
+def _located(meshes: Sequence[Meshes]) -> tuple[Array, list[Meshes]]:
+    """The tables of all lanes, each kept once, and the meshes with their places among these."""
     known: dict[bytes, int] = {}
-    kept: list[Array] = []
-    size = 0
-    places = []
-    for one in data:
-        own: list[float] = []
-        for offset, points in (*one.meshes.index[:, 2:4], *one.meshes.errors[:, 1:3]):
-            table = one.meshes.tables[offset : offset + 2 * (points + 1)]
+    kept: list[Array] = [np.zeros(1)]
+    size = 1
+    result = []
+    for one in meshes:
+        index, errors = one.index.copy(), one.errors.copy()
+        for row in (*index[:, 2:4], *errors[:, 1:3]):
+            table = one.tables[row[0] : row[0] + 2 * (row[1] + 1)]
             key = table.tobytes()
             if key not in known:
                 known[key] = size
                 kept.append(table)
                 size += table.size
-            own += [known[key], points]
-        places.append(np.array(own))
-    return np.concatenate(kept) if kept else np.zeros(1), _lanes(places)
+            row[0] = known[key]
+        result.append(one._replace(index=index, errors=errors))
+    return np.concatenate(kept), result
 
 
-def make_work(elements: LaneElements, drive: LaneDrive, inputs: int) -> LaneWork:
+def make_work(elements: LaneElements, drive: LaneDrive, inputs: int, interfaces: int) -> LaneWork:
     """Work space of the loop for so many tracks and fault rows."""
     bearings, balls = elements.bearings.cosines.shape
-    meshes, tracks = elements.meshes.index.shape[0], drive.rates.shape[0]
-    spalls = drive.spall_counts
+    meshes, tracks, spalls = elements.meshes.index.shape[0], drive.rates.shape[0], drive.spalls.shape[1]
     return LaneWork(
         phases=aligned(np.zeros((tracks, LANES))),
+        speeds=aligned(np.zeros((1, LANES))),
         inputs=aligned(np.zeros((inputs, LANES))),
         frames=aligned(np.zeros((3 * bearings, LANES))),
         missing=aligned(np.zeros((bearings * balls, LANES))),
-        meshes=aligned(np.zeros((3 * meshes, LANES))),
+        marks=np.zeros((spalls * LANES, 2), dtype=np.int64),
         lane_phases=np.zeros(tracks),
         lane_rates=np.zeros(tracks),
+        lane_motion=np.zeros(interfaces),
+        lane_motion_rates=np.zeros(interfaces),
+        lane_forces=np.zeros(interfaces),
         lane_missing=np.zeros((bearings, balls)),
-        lane_meshes=np.zeros((meshes, 3)),
-        touched=np.zeros((int(spalls[:-1].max()), 2), dtype=np.int64),
-        marks=np.zeros((int(spalls[-1]), 2), dtype=np.int64),
+        touched=np.zeros((spalls, 2), dtype=np.int64),
+        now=np.zeros((LANES, bearings, NOW_COLUMNS)),
+        jumps=np.zeros((spalls, JUMP_COLUMNS)),
+        lane_meshes=np.zeros((meshes, WORK_COLUMNS)),
     )
 
 
-def pack_drive(drives: Sequence[Drive]) -> LaneDrive:
-    """Operating points, angles and fault rows of all lanes."""
-    offsets = np.cumsum([0, *(drive.samples.size for drive in drives)])
-    tables = {}
-    for name in TABLES:
-        rows = [getattr(drive, name) for drive in drives]
-        counts = np.array([len(own) for own in rows], dtype=np.int64)
-        table = np.zeros((LANES, max(1, counts.max()), SEVERITY_COLUMNS + len(COLUMNS[name])))
-        for lane, own in enumerate(rows):
-            table[lane, : len(own)] = own
-            if "offset" in COLUMNS[name]:
-                table[lane, : len(own), SEVERITY_COLUMNS + COLUMNS[name].index("offset")] += offsets[lane]
-        tables[name] = (table, np.append(counts, counts.sum()))
+def pack_drive(
+    drives: Sequence[Drive], elements: LaneElements, memory: LaneMemory, variants: int
+) -> LaneDrive:
+    """Operating points, angles and fault rows of all lanes, of which the first `variants` are real."""
+    rows = {name: [_felt(getattr(drive, name)) for drive in drives] for name in TABLES}
+    offsets = np.cumsum([1, *(drive.samples.size for drive in drives)])
+    pitted, ill_bearings, ill_meshes = [], [], []
+    for lane in range(variants):
+        own = {name: rows[name][lane] for name in TABLES}
+        if _needs_single_bearings(own, elements, memory, lane):
+            ill_bearings.append(lane)
+        elif len(own["spalls"]):
+            pitted.append(lane)
+        if any(len(own[name]) for name in _OF_MESHES) or np.any(elements.lane_numbers[lane, :, 6]):
+            ill_meshes.append(lane)
     clock = [[drive.start_step, 1.0 / drive.length_steps, drive.anchor_step] for drive in drives]
     return LaneDrive(
         turns=_lanes(drive.turns for drive in drives),
@@ -126,9 +142,40 @@ def pack_drive(drives: Sequence[Drive]) -> LaneDrive:
         steady=int(all(drive.steady == 1 for drive in drives)),
         anchor_phases=_lanes(drive.anchor_phases for drive in drives),
         rates=_lanes(drive.rates for drive in drives),
-        spalls=tables["spalls"][0],
-        spall_counts=tables["spalls"][1],
-        mesh_mods=tables["mesh_mods"][0],
-        mod_counts=tables["mesh_mods"][1],
+        pitted=np.array(pitted, dtype=np.int64),
+        ill_bearings=np.array(ill_bearings, dtype=np.int64),
+        ill_meshes=np.array(ill_meshes, dtype=np.int64),
+        **{name: _table(name, rows[name], offsets) for name in TABLES},
         samples=np.concatenate([np.zeros(1), *(drive.samples for drive in drives)]),
     )
+
+
+def _felt(rows: Array) -> Array:
+    """Rows whose severity is not zero for good: only these may change a bit."""
+    return rows[np.any(rows[:, :2] != 0.0, axis=1)]
+
+
+def _needs_single_bearings(
+    own: dict[str, Array], elements: LaneElements, memory: LaneMemory, lane: int
+) -> bool:
+    """Whether a lane has more than rounded pits of races, or line contacts, or a cage that has slipped."""
+    spalls = own["spalls"]
+    return bool(
+        len(own["profiles"])
+        or len(own["bearing_terms"])
+        or np.any(spalls[:, _RECTANGULAR] != 0.0)
+        or np.any(spalls[:, _BALL] >= 0.0)
+        or np.any(elements.bearings.rollers)
+        or np.any(memory.cage[lane][:, [LAG, SPIN_LAG]])
+    )
+
+
+def _table(name: str, rows: Sequence[Array], offsets: Indices) -> Array:
+    """Fault rows of all lanes, filled up with rows of severity zero."""
+    columns = COLUMNS[name]
+    table = np.zeros((LANES, max(len(own) for own in rows), SEVERITY_COLUMNS + len(columns)))
+    for lane, own in enumerate(rows):
+        table[lane, : len(own)] = own
+        if "offset" in columns:
+            table[lane, : len(own), SEVERITY_COLUMNS + columns.index("offset")] += offsets[lane]
+    return table

@@ -35,9 +35,9 @@ def compiled(function: Function, *, allocates: bool = True) -> Function:
     return _compiled(function, FAST, allocates=allocates)
 
 
-def compiled_exactly(function: Function) -> Function:
+def compiled_exactly(function: Function, *, allocates: bool = True) -> Function:
     """The same, but for each operation being done as it is written and in that order."""
-    return _compiled(function, False)
+    return _compiled(function, False, allocates=allocates)
 
 
 def _compiled(function: Function, fast: set[str] | bool, *, allocates: bool = True) -> Function:

@@ -30,11 +30,12 @@ Indices = NDArray[np.int64]
 BLOCK = 4  # modes
 PAIRS = 2 * BLOCK  # their real and imaginary parts
 STATE_ROWS = 4 * PAIRS  # of a block: p, u1, u2, known force
-# Columns of `layout`: numbers of blocks, interfaces, sites and outputs, then where things begin.
+# Columns of `layout`: numbers of blocks, interfaces, their motions (displacements, and rates or none), sites
+# and outputs, then where things begin.
 (
-    BLOCKS, INTERFACES, SITES, OUTPUTS, FIRST_BLOCK, FIRST_INTERFACE, FIRST_SITE, FIRST_SUM,
+    BLOCKS, INTERFACES, MOTIONS, SITES, OUTPUTS, FIRST_BLOCK, FIRST_INTERFACE, FIRST_SITE, FIRST_SUM,
     STEP, COMPLIANCE, OUT_ROWS, OUT_COMPLIANCE, KNOWN, KNOWN_ROWS, COLUMNS,
-) = range(15)  # fmt: skip
+) = range(16)  # fmt: skip
 
 
 class LaneSystem(NamedTuple):
@@ -57,7 +58,7 @@ class LaneState(NamedTuple):
     forces: Array  # (3 interfaces, LANES) now and at the last two instants
     sums: Array  # (sums, LANES) of the next step
     known: Array  # (sums and outputs, LANES) what the known inputs add to them
-    motion: Array  # (interfaces, LANES) displacements of the interfaces
+    motion: Array  # (motions, LANES) displacements of the interfaces, then their rates or none
 
 
 @inlined
@@ -81,14 +82,16 @@ def with_forces(rows: Array, k: int, forces: Array, first: int, count: int, tota
 
 @inlined
 def motion(system: LaneSystem, state: LaneState, part: int) -> None:
-    """Displacements of a part's interfaces, from the sums and the guess of the forces."""
+    """Displacements of a part's interfaces, and rates, from the sums and the guess of the forces."""
     at = system.layout[part]
     count, first = at[INTERFACES], at[FIRST_INTERFACE]
-    for i in range(count):
+    for i in range(at[MOTIONS]):
         total = load(state.sums, at[FIRST_SUM] + i) + load(state.known, at[KNOWN_ROWS] + i)
         k = at[COMPLIANCE] + i * count
         total = with_forces(system.compliance, k, state.forces, first, count, total)
-        store(state.motion, first + i, total)
+        # Rates lie behind the displacements of all parts.
+        place = first + i if i < count else first + i - count + state.forces.shape[0] // 3
+        store(state.motion, place, total)
 
 
 @inlined
@@ -97,10 +100,11 @@ def accelerations(
 ) -> None:
     """Add those of the sites of a part to column `column` of `accel` [site][width], with the new forces."""
     at = system.layout[part]
-    count, first = at[INTERFACES], at[FIRST_INTERFACE]
+    count, first, motions = at[INTERFACES], at[FIRST_INTERFACE], at[MOTIONS]
     for i in range(at[SITES]):
-        total = load(state.sums, at[FIRST_SUM] + count + i) + load(state.known, at[KNOWN_ROWS] + count + i)
-        k = at[COMPLIANCE] + (count + i) * count
+        row = motions + i
+        total = load(state.sums, at[FIRST_SUM] + row) + load(state.known, at[KNOWN_ROWS] + row)
+        k = at[COMPLIANCE] + row * count
         total = with_forces(system.compliance, k, state.forces, first, count, total)
         place = system.site_index[at[FIRST_SITE] + i] * width + column
         store(accel, place, load(accel, place) + total)
@@ -112,7 +116,7 @@ def outputs(system: LaneSystem, state: LaneState, part: int, out: Array, row: in
     at = system.layout[part]
     count, first = at[INTERFACES], at[FIRST_INTERFACE]
     for i in range(at[OUTPUTS]):
-        total = load(state.known, at[KNOWN_ROWS] + count + at[SITES] + i)
+        total = load(state.known, at[KNOWN_ROWS] + at[MOTIONS] + at[SITES] + i)
         k = at[OUT_ROWS] + i * at[BLOCKS] * PAIRS
         for b in range(at[BLOCKS]):
             s = (at[FIRST_BLOCK] + b) * STATE_ROWS
@@ -135,7 +139,7 @@ def know(system: LaneSystem, state: LaneState, part: int, inputs: Array) -> None
             for j in range(count):
                 total = fma(load(system.known, k + j * PAIRS), load(inputs, j), total)
             store(state.modes, (at[FIRST_BLOCK] + b) * STATE_ROWS + 3 * PAIRS + m, total)
-    rows = at[INTERFACES] + at[SITES] + at[OUTPUTS]
+    rows = at[MOTIONS] + at[SITES] + at[OUTPUTS]
     for i in range(rows):
         k = (at[KNOWN_ROWS] + i) * count
         store(
@@ -170,7 +174,7 @@ def advance(system: LaneSystem, state: LaneState, part: int) -> None:
     """All modes of a part to the next instant, and the sums that the next step begins with."""
     at = system.layout[part]
     count, first, step, modes = at[INTERFACES], at[FIRST_INTERFACE], system.step, state.modes
-    rows, sums, k = count + at[SITES], at[FIRST_SUM], at[STEP]
+    rows, sums, k = at[MOTIONS] + at[SITES], at[FIRST_SUM], at[STEP]
     for i in range(rows):
         store(state.sums, sums + i, splat(0.0))
     for block in range(at[BLOCKS]):

@@ -20,8 +20,14 @@ from gearsim_sim.integrate.lane_kernel import (
 )
 from gearsim_sim.integrate.lane_pieces import cosines_sines, polynomials
 from gearsim_sim.integrate.vectors import floor, fma, load, splat, store
-from gearsim_sim.model.lane_data import Array, Indices, LaneDrive, LaneElements, LaneWork
-from gearsim_sim.model.lane_elements import lane_bearing_forces, lane_mesh_forces
+from gearsim_sim.model.lane_data import Array, Indices, LaneDrive, LaneElements, LaneMemory, LaneWork
+from gearsim_sim.model.lane_elements import (
+    ill_bearing_forces,
+    ill_mesh_forces,
+    lane_bearing_forces,
+    lane_mesh_forces,
+    rest_lanes,
+)
 
 MOTION_ROWS = 2  # before the outputs of the state: turns since the anchor, speed
 _SAMPLES = 16
@@ -69,22 +75,26 @@ def rotate_lane_sites(elements: LaneElements, phases: Array, accel: Array, width
 
 
 @cache
-def make_lane_loop() -> Callable[..., int]:
-    """The compiled loop; numba compiles it once for lanes with own matrices and once for shared ones."""
+def make_lane_loop(balls: int) -> Callable[..., int]:
+    """The compiled loop for bearings of (padded) numbers of balls.
+
+    numba compiles it once for lanes with matrices of their own and once for lanes that share them.
+    """
 
     def run(
-        system: LaneSystem, state: LaneState, elements: LaneElements, drive: LaneDrive, work: LaneWork,
-        first: int, count: int, accel: Array, width: int, column: int, out: Array,
+        system: LaneSystem, state: LaneState, elements: LaneElements, drive: LaneDrive, memory: LaneMemory,
+        work: LaneWork, first: int, count: int, accel: Array, width: int, column: int, out: Array,
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
 
         accel ([site] width; LANES) gets `count` columns from `column` on. `out` ([sample] MOTION_ROWS +
         outputs; LANES) gets the motion at the output samples.
         """
-        parts, interfaces = system.layout.shape[0], state.motion.shape[0]
+        parts, interfaces = system.layout.shape[0], work.lane_forces.size
         sites = accel.shape[0] // width
         anchor, _, _ = reference_motions(load(drive.clock, 2), drive, elements.step_s)
         changing = first + 1 if drive.steady == 1 else first + count
+        rest_lanes(drive, memory, work)
         row = 0
         for i in range(count):
             step = first + i + 1
@@ -100,7 +110,10 @@ def make_lane_loop() -> Callable[..., int]:
             for p in range(parts):
                 motion(system, state, p)
             lane_bearing_forces(step, state.motion, elements, drive, work, state.forces)
-            lane_mesh_forces(step, state.motion, speed, elements, drive, work, state.forces)
+            lane_mesh_forces(state.motion, speed, elements, drive, work, state.forces)
+            store(work.speeds, 0, speed)
+            ill_bearing_forces(step, state.motion, elements, drive, memory, work, state.forces, balls)
+            ill_mesh_forces(step, state.motion, elements, drive, work, state.forces)
             for j in range(sites):
                 store(accel, j * width + column + i, splat(0.0))
             for p in range(parts):
@@ -116,7 +129,7 @@ def make_lane_loop() -> Callable[..., int]:
                 advance(system, state, p)
         return row
 
-    return compiled_exactly(run)
+    return compiled_exactly(run, allocates=False)
 
 
 @compiled_exactly
