@@ -31,10 +31,12 @@ def mesh_direction(pinion_radius_m: float, gear_radius_m: float) -> Vector:
     return {"theta_pin": pinion_radius_m, "theta_ge": -gear_radius_m, "y_pin": -1.0, "y_ge": 1.0}
 
 
-def add_mesh(assembly: Assembly, mesh: MeshStiffness, direction: Vector) -> None:
+def add_mesh(
+    assembly: Assembly, mean_stiffness_n_per_m: float, damping_ns_per_m: float, direction: Vector
+) -> None:
     """The mean stiffness and the damper, and the interface for what is left of the force."""
-    assembly.spring(direction, mesh.mean_stiffness_n_per_m)
-    assembly.damper(direction, mesh.damping_ns_per_m)
+    assembly.spring(direction, mean_stiffness_n_per_m)
+    assembly.damper(direction, damping_ns_per_m)
     assembly.interface(INTERFACE, direction)
 
 

@@ -17,11 +17,14 @@ from gearsim_sim.model.assembly import Assembly, LinearSystem, Vector
 from gearsim_sim.model.ball_bearing import BallBearing, make_ball_bearing
 from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.gear_errors import gear_error
-from gearsim_sim.model.gear_mesh import Mesh, MeshError, add_mesh, mesh_direction, stiffness_series
+from gearsim_sim.model.gear_mesh import Mesh, MeshError, add_mesh, mesh_direction
+from gearsim_sim.model.gear_wheel import GearWheel
+from gearsim_sim.model.mesh_stiffness import StiffnessCurve, stiffness_curve
 from gearsim_sim.model.pedestal import add_pedestal
 from gearsim_sim.model.plant import BASE_INPUTS, Limits, Plant, StateRow, Track
 from gearsim_sim.model.ring import Ring
 from gearsim_sim.model.shaft import bending_link, torsion_link
+from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.params.parallel import BEARINGS, ParallelModel, ParallelParams, TorsionalEnd
 
 INPUT, OUTPUT = 0, 1
@@ -35,7 +38,9 @@ _ENCODERS = ("theta_ec1", "theta_ec2")
 def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
     """Assemble the model; `seed` gives the gears their random errors."""
     model, physics = params.model, params.physics
-    system = _assemble(model, pedestals=params.pedestals)
+    pair = params.gear_pair
+    curve = stiffness_curve(model.mesh, pair, variation=physics.mesh_stiffness_variation)
+    system = _assemble(model, curve.mean_n_per_m, pedestals=params.pedestals)
     x_names = tuple(name for name in system.dof_names if name.startswith("x_"))
     rigid = dict.fromkeys(_ROTATIONS[INPUT], 1.0) | dict.fromkeys(_ROTATIONS[OUTPUT], params.speed_ratio)
     laws = _bearing_laws(params)
@@ -48,7 +53,8 @@ def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
         parts=(x_names, tuple(name for name in system.dof_names if name not in x_names)),
         tracks=_tracks(params, laws),
         bearings=tuple(_seat(params, system, number, law) for number, law in enumerate(laws)),
-        meshes=(_mesh(params, system, seed),),
+        meshes=(_mesh(params, curve, system, seed),),
+        wheels=() if pair is None else _wheels(params, pair),
         rigid=system.direction(rigid),
         encoders={shaft: (i, {_ENCODERS[i]: 1.0}) for i, shaft in enumerate(shafts)},
         sites={
@@ -89,7 +95,25 @@ def _tracks(params: ParallelParams, laws: tuple[BallBearing, ...]) -> tuple[Trac
     return (*shafts, *cages, *spins)
 
 
-def _mesh(params: ParallelParams, system: LinearSystem, seed: int) -> Mesh:
+def _wheels(params: ParallelParams, pair: GearPair) -> tuple[GearWheel, ...]:
+    """Pinion and gear; both meet tooth 0 when they begin to turn, as the tooth phase is 0 there."""
+    model = params.model
+    return tuple(
+        GearWheel(
+            name=f"{params.mesh.name}.{part}",
+            mesh=0,
+            track=track,
+            pair=pair,
+            of_wheel=track == OUTPUT,
+            start_turns=0.0,
+            force_per_load_n_per_nm=1 / model.gear.base_radius_m,
+            harmonics=int(max(model.mesh.harmonics, model.gear_errors.harmonics)),
+        )
+        for track, part in ((INPUT, "pinion"), (OUTPUT, "gear"))
+    )
+
+
+def _mesh(params: ParallelParams, curve: StiffnessCurve, system: LinearSystem, seed: int) -> Mesh:
     model, physics = params.model, params.physics
     teeth = (params.mesh.driving_teeth, params.mesh.driven_teeth)
     phases = (model.gear_errors.pinion_phase_rad, model.gear_errors.gear_phase_rad)
@@ -97,13 +121,14 @@ def _mesh(params: ParallelParams, system: LinearSystem, seed: int) -> Mesh:
     return Mesh(
         name=params.mesh.name,
         interface=system.interface_names.index("mesh"),
-        stiffness=stiffness_series(model.mesh, variation=physics.mesh_stiffness_variation),
-        mean_stiffness_n_per_m=model.mesh.mean_stiffness_n_per_m,
+        stiffness=curve.series,
+        mean_stiffness_n_per_m=curve.mean_n_per_m,
         damping_ns_per_m=model.mesh.damping_ns_per_m,
         track=INPUT,
         cycles=float(teeth[0]),
         phase_offset=0.0,
         errors=tuple(MeshError(shaft, errors[shaft]) for shaft in (INPUT, OUTPUT)),
+        pulse=curve.pulse,
     )
 
 
@@ -152,7 +177,7 @@ _ROTATIONS = (
 )
 
 
-def _assemble(model: ParallelModel, *, pedestals: bool) -> LinearSystem:
+def _assemble(model: ParallelModel, mesh_stiffness_n_per_m: float, *, pedestals: bool) -> LinearSystem:
     assembly = Assembly()
     _add_inertias(assembly, model)
     if pedestals:
@@ -172,7 +197,8 @@ def _assemble(model: ParallelModel, *, pedestals: bool) -> LinearSystem:
             assembly.spring(across, model.ball_bearing.nominal_stiffness_n_per_m)
             assembly.damper(across, seat.damping_ns_per_m)
             assembly.interface(f"b{number}_{axis}", across)
-    add_mesh(assembly, model.mesh, mesh_direction(model.pinion.base_radius_m, model.gear.base_radius_m))
+    along = mesh_direction(model.pinion.base_radius_m, model.gear.base_radius_m)
+    add_mesh(assembly, mesh_stiffness_n_per_m, model.mesh.damping_ns_per_m, along)
     _add_inputs(assembly, model, pedestals=pedestals)
     return assembly.build()
 

@@ -14,21 +14,22 @@ _SOURCE = "scenario"
 
 
 def override(section: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """A copy of `section` with the numbers that `overrides` names, such as `{"pedestal.mass": "10 kg"}`.
+    """A copy of `section` with what `overrides` names replaced, such as `{"pedestal.mass": "10 kg"}`.
 
     Parameters
     ----------
     section : mapping
         Plain content of a `model` section; each number is `{value, unit, source}`.
     overrides : mapping
-        Dotted name to `"10 kg"`, `{value: 10, unit: kg}` or, without unit, a plain number.
+        Dotted name to `"10 kg"`, `{value: 10, unit: kg}` or, without unit, a plain number; a choice is
+        replaced by another word.
     where : str
         Named in errors.
 
     Raises
     ------
     InputError
-        A name that the section does not have, or that is not a single number.
+        A name that the section does not have, or that is not a single number or choice.
     """
     result = copy.deepcopy(dict(section))
     for name, value in overrides.items():
@@ -37,6 +38,9 @@ def override(section: Mapping[str, Any], overrides: Mapping[str, Any], where: st
         for part in path:
             place = _inner(place, part, f"parameters.{name}", where)
         old = _inner(place, last, f"parameters.{name}", where)
+        if isinstance(old, str) and isinstance(value, str):
+            place[last] = value  # a choice, such as mesh.stiffness_model
+            continue
         if not isinstance(old, dict) or "value" not in old:
             expected = _known(old) if isinstance(old, dict) else "the name of a number of the model"
             raise InputError(where, f"parameters.{name}", value, expected)

@@ -17,12 +17,16 @@ from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine
 from gearsim_io.quantities import Si, validate
+from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
+from gearsim_sim.params.teeth import Teeth
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
 MODEL_KIND = "parallel_shaft"
+# Base radii of teeth and model may differ by this part: numbers of YAML are written with three digits.
+_SAME_RADIUS = 1e-3
 
 
 class TorsionalEnd(Strict):
@@ -57,8 +61,13 @@ class Shafts(Strict):
 
 
 class MeshStiffness(Strict):
-    """Stiffness and damping of the tooth contact along the line of action."""
+    """Stiffness and damping of the tooth contact along the line of action.
 
+    `stiffness_model`: `tabulated` takes mean stiffness, contact ratio and stiffness ratio from here;
+    `potential_energy` and `rectangular` take all that from the `teeth` section.
+    """
+
+    stiffness_model: Literal["tabulated", "potential_energy", "rectangular"] = "tabulated"
     mean_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="mean_stiffness")]
     damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
     contact_ratio: Annotated[float, Si("", gt=1, lt=2)]
@@ -127,6 +136,7 @@ class ParallelModel(Strict):
     shafts: Shafts
     seats: dict[str, Seat]
     mesh: MeshStiffness
+    teeth: Teeth | None = None
     gear_errors: GearErrors
     ball_bearing: RollingBearing
     pedestal: Pedestal
@@ -149,6 +159,16 @@ class ParallelParams(Strict):
     def speed_ratio(self) -> float:
         """Speed of the output shaft over that of the input shaft."""
         return self.mesh.driving_teeth / self.mesh.driven_teeth
+
+    @property
+    def gear_pair(self) -> GearPair | None:
+        """The teeth in mesh, if the model describes them; InputError if there are no such gears."""
+        if self.model.teeth is None:
+            return None
+        try:
+            return self.model.teeth.pair(self.mesh.driving_teeth, self.mesh.driven_teeth)
+        except InputError as error:
+            raise InputError(self.where, f"teeth.{error.field}", error.value, error.expected) from None
 
     def with_physics(self, **switches: bool) -> ParallelParams:
         """The same machine with some physics switched (`gravity=False`)."""
@@ -232,7 +252,24 @@ def _check(params: ParallelParams) -> None:
     teeth = params.mesh.driven_teeth / params.mesh.driving_teeth
     if abs(radii / teeth - 1) > 1e-9:
         raise InputError(where, "gear.base_radius", radii, f"radii in the ratio of the teeth, {teeth:.9g}")
+    _check_teeth(params)
     if model.drive.speed_hz > model.drive.speed_limit_hz:
         raise InputError(where, "drive.speed", model.drive.speed_hz, f"<= {model.drive.speed_limit_hz} Hz")
     if model.drive.load_nm > model.drive.load_limit_nm:
         raise InputError(where, "drive.load", model.drive.load_nm, f"<= {model.drive.load_limit_nm} N m")
+
+
+def _check_teeth(params: ParallelParams) -> None:
+    """The teeth must be there if they are needed, possible, and those of the model's base circles."""
+    model, pair = params.model, params.gear_pair
+    if pair is None:
+        if model.mesh.stiffness_model != "tabulated":
+            expected = f"this section, since mesh.stiffness_model is {model.mesh.stiffness_model}"
+            raise InputError(params.where, "teeth", "nothing", expected)
+        return
+    radius = model.pinion.base_radius_m
+    if abs(pair.pinion.base_radius_m / radius - 1) > _SAME_RADIUS:
+        expected = (
+            f"teeth with the pinion's base radius {radius:g} m; these have {pair.pinion.base_radius_m:.6g} m"
+        )
+        raise InputError(params.where, "teeth.module", model.teeth and model.teeth.module_m, expected)

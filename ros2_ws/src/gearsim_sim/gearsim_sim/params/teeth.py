@@ -34,25 +34,21 @@ class Teeth(Strict):
 
     def pair(self, pinion_teeth: int, gear_teeth: int) -> GearPair:
         """The gears in mesh; InputError if there are no such gears."""
-        bores = (self.pinion_bore_radius_m, self.gear_bore_radius_m)
-        shifts = (self.pinion_shift, self.gear_shift)
-        gears = [
-            SpurGear(
-                teeth=teeth,
-                module_m=self.module_m,
-                face_width_m=self.face_width_m,
-                hub_radius_m=bore,
-                pressure_angle_rad=self.pressure_angle_rad,
-                addendum=self.addendum,
-                dedendum=self.dedendum,
-                fillet=self.fillet,
-                profile_shift=shift,
-                youngs_modulus_pa=self.youngs_modulus_pa,
-                poisson_ratio=self.poisson_ratio,
-                name=name,
-            )
-            for name, teeth, bore, shift in zip(
-                ("pinion", "gear"), (pinion_teeth, gear_teeth), bores, shifts, strict=True
-            )
-        ]
-        return GearPair(*gears)
+        pinion = self._gear("pinion", pinion_teeth, self.pinion_bore_radius_m, self.pinion_shift)
+        return GearPair(pinion, self._gear("gear", gear_teeth, self.gear_bore_radius_m, self.gear_shift))
+
+    def _gear(self, name: str, teeth: int, bore_radius_m: float, shift: float) -> SpurGear:
+        return SpurGear(
+            teeth=teeth,
+            module_m=self.module_m,
+            face_width_m=self.face_width_m,
+            hub_radius_m=bore_radius_m,
+            pressure_angle_rad=self.pressure_angle_rad,
+            addendum=self.addendum,
+            dedendum=self.dedendum,
+            fillet=self.fillet,
+            profile_shift=shift,
+            youngs_modulus_pa=self.youngs_modulus_pa,
+            poisson_ratio=self.poisson_ratio,
+            name=name,
+        )

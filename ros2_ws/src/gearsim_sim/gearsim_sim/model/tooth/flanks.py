@@ -14,9 +14,12 @@ from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_sim.model.periodic import PeriodicSeries
+from gearsim_sim.model.tooth.compliance import hertz_compliance
 from gearsim_sim.model.tooth.gear import SpurGear
 from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.model.tooth.sharing import shares, tooth_error_series
+from gearsim_sim.model.tooth.stiffness import pair_compliance
+from gearsim_sim.model.tooth.windows import window_nodes, window_series
 
 Array = NDArray[np.float64]
 
@@ -172,3 +175,26 @@ def relief_depth(pair: GearPair, relief: Relief, phase: Array, *, of_wheel: bool
     tip, root = ((sign * along - (half - reach)) / reach for sign in (1, -1))
     shape = [np.clip(part, 0.0, 1.0) ** relief.power for part in (tip, root)]
     return np.asarray(relief.tip_m * shape[0] + relief.root_m * shape[1])
+
+
+def spall_contact_loss(
+    pair: GearPair,
+    spall: ToothSpall,
+    part: float,
+    *,
+    of_wheel: bool = False,
+    tooth: int = 0,
+    harmonics: int = 8,
+) -> PeriodicSeries:
+    """Deviation of the mesh stiffness [N/m, <= 0] while the spall takes `part` of the contact line.
+
+    The Hertz spring of the pair is as much shorter; 0 <= part < 1.
+    """
+    gear = pair.gear(of_wheel=of_wheel)
+    first, _, last = spall_extent(pair, spall, of_wheel=of_wheel)
+    nodes = window_nodes(pair.contact_ratio, harmonics, [first, last])
+    more = hertz_compliance(pair.pinion, pair.wheel) * part / (1 - part)
+    compliance = pair_compliance(pair, nodes.phase)
+    inside = (nodes.phase > first) & (nodes.phase < last)
+    loss = np.where(inside, 1 / compliance - 1 / (compliance + more), 0.0)
+    return window_series(nodes, -loss, gear.teeth, tooth, harmonics)

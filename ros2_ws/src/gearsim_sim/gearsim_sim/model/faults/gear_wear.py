@@ -1,0 +1,54 @@
+"""Wear of all flanks of a gear: material lost where the flanks slide, least at the pitch point."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from gearsim_sim.model.contributions import Contribution
+from gearsim_sim.model.faults.kind import FaultKind
+from gearsim_sim.model.faults.wheels import error_mod, normal_draws, wheel_names, wheels_of
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.tooth.flanks import wear_depth
+from gearsim_sim.model.tooth.sharing import tooth_error_series
+from gearsim_sim.params.fields import Fraction, SiKeyed, Strict
+
+_STREAM = 11
+
+
+class GearWearParams(Strict):
+    """`depth_m` where the flanks have lost most; `scatter`: standard deviation from tooth to tooth, of it."""
+
+    depth_m: Annotated[float, SiKeyed("m", gt=0)] = 20e-6
+    scatter: Fraction = 0.1
+
+
+def place(params: GearWearParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:
+    """Transmission error in each mesh of the wheel; the teeth have the same wear in all of them."""
+    mods = []
+    draws = None
+    for wheel in wheels_of(plant, component):
+        if draws is None:
+            draws = normal_draws(seed, _STREAM, wheel)
+        series = tooth_error_series(
+            wheel.pair,
+            lambda phase, wheel=wheel: (
+                -params.depth_m * wear_depth(wheel.pair, phase, of_wheel=wheel.of_wheel)
+            ),
+            np.maximum(0.0, 1 + params.scatter * draws),
+            teeth=wheel.gear.teeth,
+            harmonics=wheel.harmonics,
+        )
+        mods.append(error_mod(wheel, series))
+    return tuple(mods)
+
+
+KIND = FaultKind(
+    name="gear_wear",
+    summary="uniform wear of a gear's flanks after Archard, zero at the pitch point",
+    params_model=GearWearParams,
+    components=wheel_names,
+    place=place,
+    look_for="Higher mesh lines, the second and third above all; with scatter between the teeth also low lines of the shaft.",
+)
