@@ -23,7 +23,7 @@ from gearsim_sim.model.tooth.flanks import (
 from gearsim_sim.model.tooth.gear import SpurGear
 from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.model.tooth.runout import eccentricity_error, eccentricity_stiffness
-from gearsim_sim.model.tooth.sharing import loaded_mesh, loaded_series, shares, tooth_error_series
+from gearsim_sim.model.tooth.sharing import loaded_error_series, loaded_mesh, shares, tooth_error_series
 from gearsim_sim.model.tooth.stiffness import mesh_stiffness, pair_stiffness, stiffness_series
 from gearsim_sim.model.tooth.windows import shifted, stretched, truncation_error
 
@@ -325,18 +325,24 @@ def test_relief_for_the_load_quietens_the_mesh():
     assert right < 0.3 * much
 
 
-def test_loaded_series_stand_for_the_curves():
-    relief = Relief(tip_m=5e-6, length=0.5)
+def test_loaded_error_gives_the_compression_under_the_load():
+    """With the stiffness of the unmodified mesh: the mean exactly, the curve but for its jumps."""
+    relief, force = Relief(tip_m=5e-6, length=0.5), 1000.0
 
     def profile(t):
         return -relief_depth(PAIR, relief, t, of_wheel=False)
 
-    stiffness, error = loaded_series(PAIR, profile, 1000.0, 12)
+    series = loaded_error_series(PAIR, profile, force, 40)
     phase = (np.arange(1000) + 0.5) / 1000
-    k, e = loaded_mesh(PAIR, profile, 1000.0, phase)
-    assert stiffness.mean == pytest.approx((k - mesh_stiffness(PAIR, phase)).mean(), rel=0.02)
-    assert error.mean == pytest.approx(e.mean(), rel=0.02)
-    assert np.std(error.value(phase) - e) < 0.15 * np.abs(e).max()  # jumps where a pair leaves
+    k, e = loaded_mesh(PAIR, profile, force, phase)
+    exact = force / mesh_stiffness(PAIR, phase) - (force / k - e)
+    assert exact.max() < 1e-12 < -exact.min()
+    assert series.mean == pytest.approx(exact.mean(), rel=0.01)
+    assert np.std(series.value(phase) - exact) < 0.1 * np.abs(exact).max()
+    # A heavy load presses all pairs together: what is left is the relief times the share.
+    heavy = loaded_error_series(PAIR, profile, 1e6, 40)
+    flat = tooth_error_series(PAIR, profile, np.ones(32), teeth=32, harmonics=40)
+    assert heavy.value(phase) == pytest.approx(flat.value(phase / 32), abs=0.05 * 5e-6)
 
 
 # Eccentricity

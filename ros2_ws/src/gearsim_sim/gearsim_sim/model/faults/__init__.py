@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from gearsim_io.errors import InputError
 from gearsim_sim.model.faults import (
+    gear_backlash,
+    gear_eccentricity,
+    gear_misalignment,
+    gear_tooth_crack,
+    gear_tooth_spall,
+    gear_wear,
     inner_race_spall,
     outer_race_spall,
     planet_position_error,
     planet_tooth_crack,
     planet_tooth_spall,
+    profile_modification,
+    tooth_pitch_error,
     unequal_load_sharing,
 )
 from gearsim_sim.model.faults.kind import Fault, FaultKind
@@ -20,6 +28,14 @@ _KINDS = (
     planet_tooth_spall.KIND,
     planet_position_error.KIND,
     unequal_load_sharing.KIND,
+    gear_tooth_crack.KIND,
+    gear_tooth_spall.KIND,
+    gear_wear.KIND,
+    gear_eccentricity.KIND,
+    tooth_pitch_error.KIND,
+    profile_modification.KIND,
+    gear_backlash.KIND,
+    gear_misalignment.KIND,
 )
 REGISTRY: dict[str, FaultKind] = {kind.name: kind for kind in _KINDS}
 

@@ -34,6 +34,8 @@ KIND = FaultKind(
     params_model=GearBacklashParams,
     components=geared_mesh_names,
     place=place,
-    look_for="At low load or with large errors the teeth rattle: broad-band bursts where the torque passes through zero, "
-    "subharmonics, a mesh force that stays at zero. At full load nothing at all.",
+    look_for=(
+        "At low load or with large errors the teeth rattle: broad-band bursts where the torque passes "
+        "through zero, subharmonics, a mesh force that stays at zero. At full load nothing at all."
+    ),
 )

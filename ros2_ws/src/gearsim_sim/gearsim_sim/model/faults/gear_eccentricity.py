@@ -48,5 +48,8 @@ KIND = FaultKind(
     params_model=GearEccentricityParams,
     components=wheel_names,
     place=place,
-    look_for="The shaft's line in encoder and torque, and one pair of sidebands at the shaft's speed beside every mesh line.",
+    look_for=(
+        "The shaft's line in encoder and torque, and one pair of sidebands at the shaft's speed beside "
+        "every mesh line."
+    ),
 )

@@ -37,6 +37,8 @@ KIND = FaultKind(
     params_model=GearMisalignmentParams,
     components=geared_mesh_names,
     place=place,
-    look_for="A softer mesh at low load: mesh lines and their harmonics change with the torque; at full contact only a "
-    "steady angle is left.",
+    look_for=(
+        "A softer mesh at low load: mesh lines and their harmonics change with the torque; at full contact "
+        "only a steady angle is left."
+    ),
 )

@@ -58,10 +58,12 @@ def place(
 
 KIND = FaultKind(
     name="gear_tooth_crack",
-    summary="root crack of one tooth: mesh stiffness drops once per turn of the gear (potential-energy method)",
+    summary="root crack of one tooth: less mesh stiffness once per turn (potential-energy method)",
     params_model=GearToothCrackParams,
     components=wheel_names,
     place=place,
-    look_for="Once per turn of the cracked gear a short ripple; sidebands of its shaft around the mesh lines; in the "
-    "residual of the synchronous average one burst per turn, which grows with the load.",
+    look_for=(
+        "Once per turn of the cracked gear a short ripple; sidebands of its shaft around the mesh lines; in "
+        "the residual of the synchronous average one burst per turn, which grows with the load."
+    ),
 )

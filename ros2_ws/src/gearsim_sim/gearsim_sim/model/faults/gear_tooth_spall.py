@@ -96,6 +96,9 @@ KIND = FaultKind(
     params_model=GearToothSpallParams,
     components=wheel_names,
     place=place,
-    look_for="One sharp double event per turn of the gear, when contact enters and leaves the pit; many sidebands of the "
-    "shaft around mesh lines and resonances; hardly any dependence on load, unlike a crack.",
+    look_for=(
+        "One sharp double event per turn of the gear, when contact enters and leaves the pit; many "
+        "sidebands of the shaft around mesh lines and resonances; hardly any dependence on load, unlike a "
+        "crack."
+    ),
 )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults.kind import FaultKind
 from gearsim_sim.model.faults.wheels import error_mod, normal_draws, wheel_names, wheels_of
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.tooth.flanks import wear_depth
+from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.model.tooth.sharing import tooth_error_series
 from gearsim_sim.params.fields import Fraction, SiKeyed, Strict
 
@@ -33,15 +36,17 @@ def place(params: GearWearParams, component: str, plant: Plant, seed: int) -> tu
             draws = normal_draws(seed, _STREAM, wheel)
         series = tooth_error_series(
             wheel.pair,
-            lambda phase, wheel=wheel: (
-                -params.depth_m * wear_depth(wheel.pair, phase, of_wheel=wheel.of_wheel)
-            ),
-            np.maximum(0.0, 1 + params.scatter * draws),
+            partial(_missing, wheel.pair, wheel.of_wheel),
+            params.depth_m * np.maximum(0.0, 1 + params.scatter * draws),
             teeth=wheel.gear.teeth,
             harmonics=wheel.harmonics,
         )
         mods.append(error_mod(wheel, series))
     return tuple(mods)
+
+
+def _missing(pair: GearPair, of_wheel: bool, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+    return -wear_depth(pair, phase, of_wheel=of_wheel)
 
 
 KIND = FaultKind(
@@ -50,5 +55,8 @@ KIND = FaultKind(
     params_model=GearWearParams,
     components=wheel_names,
     place=place,
-    look_for="Higher mesh lines, the second and third above all; with scatter between the teeth also low lines of the shaft.",
+    look_for=(
+        "Higher mesh lines, the second and third above all; with scatter between the teeth also low lines "
+        "of the shaft."
+    ),
 )

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_io.quantities import Si
 from gearsim_sim.model.contributions import Contribution
-from gearsim_sim.model.faults.kind import MAX_SEVERITY, FaultKind
-from gearsim_sim.model.faults.wheels import error_mod, scale_of, stiffness_mod, wheel_names, wheels_of
+from gearsim_sim.model.faults.kind import FaultKind
+from gearsim_sim.model.faults.wheels import error_mod, scale_of, wheel_names, wheels_of
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.tooth.flanks import Relief, relief_depth
-from gearsim_sim.model.tooth.sharing import loaded_series
-from gearsim_sim.model.tooth.windows import scaled, stretched
+from gearsim_sim.model.tooth.pair import GearPair
+from gearsim_sim.model.tooth.sharing import loaded_error_series
+from gearsim_sim.model.tooth.windows import stretched
 from gearsim_sim.params.fields import SiKeyed, Strict
 
 
@@ -34,25 +39,27 @@ def place(
     plant: Plant,
     seed: int,  # noqa: ARG001
 ) -> tuple[Contribution, ...]:
-    """Stiffness and transmission error under the load, in each mesh of the wheel."""
+    """Transmission error in each mesh of the wheel that gives its compression under the load."""
     load = plant.limits.load_nm if params.load_nm is None else params.load_nm
     if load <= 0:
         raise InputError(
             component, "load_nm", load, "a load above zero under which the pairs share the force"
         )
     relief = Relief(params.tip_m, params.root_m, params.length, params.power)
-    found: list[Contribution] = []
+    mods = []
     for wheel in wheels_of(plant, component):
-        stiffness, error = loaded_series(
-            wheel.pair,
-            lambda phase, wheel=wheel: -relief_depth(wheel.pair, relief, phase, of_wheel=wheel.of_wheel),
-            load * wheel.force_per_load_n_per_nm,
-            wheel.harmonics,
-        )
-        teeth, scale = wheel.gear.teeth, scale_of(plant, wheel)
-        found.append(stiffness_mod(plant, wheel, stretched(scaled(stiffness, scale), teeth), MAX_SEVERITY))
-        found.append(error_mod(wheel, stretched(error, teeth)))
-    return tuple(found)
+        # The teeth of the model may be softer or stiffer than by the potential-energy method.
+        force = load * wheel.force_per_load_n_per_nm / scale_of(plant, wheel)
+        missing = partial(_missing, wheel.pair, relief, wheel.of_wheel)
+        error = loaded_error_series(wheel.pair, missing, force, wheel.harmonics)
+        mods.append(error_mod(wheel, stretched(error, wheel.gear.teeth)))
+    return tuple(mods)
+
+
+def _missing(
+    pair: GearPair, relief: Relief, of_wheel: bool, phase: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return -relief_depth(pair, relief, phase, of_wheel=of_wheel)
 
 
 KIND = FaultKind(
@@ -61,5 +68,7 @@ KIND = FaultKind(
     params_model=ProfileModificationParams,
     components=wheel_names,
     place=place,
-    look_for="Only mesh lines change: lower near the load that the relief was made for, higher far from it.",
+    look_for=(
+        "Only mesh lines change: lower near the load that the relief was made for, higher far from it."
+    ),
 )

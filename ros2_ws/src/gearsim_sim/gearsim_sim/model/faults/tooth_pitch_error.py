@@ -46,6 +46,8 @@ KIND = FaultKind(
     params_model=ToothPitchErrorParams,
     components=wheel_names,
     place=place,
-    look_for="One tooth: a jolt per turn and flat sidebands of the shaft. All teeth: lines at all multiples of the shaft's "
-    "speed, which stay the same from turn to turn.",
+    look_for=(
+        "One tooth: a jolt per turn and flat sidebands of the shaft. All teeth: lines at all multiples of "
+        "the shaft's speed, which stay the same from turn to turn."
+    ),
 )

@@ -12,8 +12,8 @@ from gearsim_sim.model.periodic import PeriodicSeries
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.tooth.stiffness import stiffness_series
 
-# The largest part of its stiffness that a mesh may lose at the highest severity.
-_MOST = 0.9
+# Part of its least stiffness that a mesh must keep at the highest severity.
+_LEAST = 0.1
 
 
 def wheel_names(plant: Plant) -> tuple[str, ...]:
@@ -37,7 +37,7 @@ def mesh_index(plant: Plant, component: str) -> int:
     return next(index for index, mesh in enumerate(plant.meshes) if mesh.name == component)
 
 
-def check_tooth(wheel: GearWheel, tooth: int) -> int:
+def check_tooth(wheel: GearWheel, tooth: float) -> int:
     """Index from 0 of a tooth that is counted from 1."""
     if not 1 <= tooth <= wheel.gear.teeth:
         raise InputError(wheel.name, "tooth", tooth, f"1 to {wheel.gear.teeth}")
@@ -54,20 +54,21 @@ def scale_of(plant: Plant, wheel: GearWheel) -> float:
 
 
 def stiffness_mod(plant: Plant, wheel: GearWheel, series: PeriodicSeries, max_severity: float) -> MeshMod:
-    """A change of stiffness, if the mesh stays stiff at the highest severity.
+    """A change of stiffness over the turn since tooth 0 was half a pitch before its contact.
 
     Raises
     ------
     InputError
-        If it would lose more than nine tenths of its stiffness.
+        If less than a tenth of the least stiffness would be left anywhere at the highest severity.
     """
-    mesh = plant.meshes[wheel.mesh]
-    turns = np.arange(64 * wheel.gear.teeth) / (64 * wheel.gear.teeth)
-    lowest = float(np.min(mesh.stiffness.value(turns * wheel.gear.teeth)))
-    loss = -max_severity * float(np.min(series.value(turns)))
-    if loss > _MOST * lowest:
-        expected = f"a fault that takes less than {_MOST * lowest / max_severity:.3g} N/m at severity 1"
-        raise InputError(wheel.name, "stiffness", f"{loss / max_severity:.3g} N/m less", expected)
+    teeth = wheel.gear.teeth
+    turns = np.arange(64 * teeth) / (64 * teeth)
+    sound = plant.meshes[wheel.mesh].stiffness.value(turns * teeth)
+    left = sound + max_severity * series.value(turns)
+    if np.min(left) < _LEAST * np.min(sound):
+        lost = f"{100 * float(np.max(-series.value(turns) / sound)):.3g} % less"
+        expected = f"less than {100 * (1 - _LEAST) / max_severity:.3g} % lost at severity 1"
+        raise InputError(wheel.name, "stiffness", lost, expected)
     return MeshMod(wheel.mesh, STIFFNESS, wheel.track, wheel.placed(series))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gearsim_sim.model.periodic import PeriodicSeries
 from gearsim_sim.model.tooth.pair import GearPair
-from gearsim_sim.model.tooth.stiffness import neighbours, pair_stiffness
+from gearsim_sim.model.tooth.stiffness import mesh_stiffness, neighbours, pair_stiffness
 from gearsim_sim.model.tooth.windows import Nodes, window_nodes, window_series
 
 Array = NDArray[np.float64]
@@ -101,14 +101,15 @@ def loaded_mesh(pair: GearPair, profile: Profile, force_n: float, mesh_phase: Ar
     return total[rows, count], moment[rows, count] / total[rows, count]
 
 
-def loaded_series(
-    pair: GearPair, profile: Profile, force_n: float, harmonics: int
-) -> tuple[PeriodicSeries, PeriodicSeries]:
-    """Deviation of the stiffness [N/m] from the unmodified mesh, and transmission error [m], over a pitch."""
+def loaded_error_series(pair: GearPair, profile: Profile, force_n: float, harmonics: int) -> PeriodicSeries:
+    """Transmission error [m] over a pitch with which the mesh has the compression of this force.
+
+    The mesh keeps its stiffness k0, all pairs in contact; where pairs have lost contact, the compression that
+    is more for want of their stiffness is taken into the error: e = force / k0 - d. At this force that is
+    exact, also where the profile parts the teeth.
+    """
     nodes = window_nodes(1.0, harmonics, list(np.arange(-0.5, 0.5, _FINE)))
     phase = nodes.phase + 0.5
     stiffness, error = loaded_mesh(pair, profile, force_n, phase)
-    plain, _ = loaded_mesh(pair, np.zeros_like, force_n, phase)
-    both = (window_series(nodes, values, 1, 0, harmonics) for values in (stiffness - plain, error))
-    first, second = both
-    return first, second
+    compression = force_n / stiffness - error
+    return window_series(nodes, force_n / mesh_stiffness(pair, phase) - compression, 1, 0, harmonics)
