@@ -408,6 +408,18 @@ def test_contact_never_pulls_and_its_damper_dissipates():
     assert abs(law.force(1e-12, -1.0, 3e8, 2594.0)) < 1e-2  # continuous at touch, however fast
 
 
+def test_a_face_is_a_row_of_springs():
+    """Against 4000 strips that touch one after the other."""
+    law = ToothContact(5e-6, 8e-6)
+    strips = (np.arange(4000) + 0.5) / 4000 * 8e-6
+    for d in (1e-6, 7.9e-6, 8.1e-6, 3e-5, -2e-6, -9e-6, -3e-5):
+        depth = (d if d > 0 else -d - 5e-6) - strips
+        sign = 1 if d > 0 else -1
+        assert law.elastic(d) == pytest.approx(sign * np.maximum(0, depth).mean(), abs=1e-12)
+        assert law.touching(d) == pytest.approx(np.mean(depth > 0), abs=1e-3)
+        assert law.slope(d) == pytest.approx(np.mean(depth > 0), abs=1e-3)
+
+
 def test_no_play_is_a_plain_spring():
     law = ToothContact()
     for d in (-3e-6, 0.0, 2e-6):

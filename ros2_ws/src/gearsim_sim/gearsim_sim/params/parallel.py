@@ -18,6 +18,7 @@ from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine
 from gearsim_io.quantities import Si, validate
 from gearsim_sim.model.tooth.pair import GearPair
+from gearsim_sim.model.tooth.stiffness import pair_compliance
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
@@ -166,9 +167,11 @@ class ParallelParams(Strict):
         if self.model.teeth is None:
             return None
         try:
-            return self.model.teeth.pair(self.mesh.driving_teeth, self.mesh.driven_teeth)
+            pair = self.model.teeth.pair(self.mesh.driving_teeth, self.mesh.driven_teeth)
+            pair_compliance(pair, 0.0)  # fillets and wheel bodies must be possible, too
         except InputError as error:
             raise InputError(self.where, f"teeth.{error.field}", error.value, error.expected) from None
+        return pair
 
     def with_physics(self, **switches: bool) -> ParallelParams:
         """The same machine with some physics switched (`gravity=False`)."""

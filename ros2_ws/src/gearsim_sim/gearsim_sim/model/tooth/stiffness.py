@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 SMITH_PAIR_STIFFNESS_PA = 1.4e10
 
 
-def pair_compliance(pair: GearPair, phase: Array) -> Array:
+def pair_compliance(pair: GearPair, phase: Array | float) -> Array:
     """Compliance of one pair of sound teeth [m/N] at these phases, whether in contact or not."""
-    position = pair.position_m(np.atleast_1d(phase))
+    position = pair.position_m(np.atleast_1d(np.asarray(phase)))
     total = np.full(position.shape, hertz_compliance(pair.pinion, pair.wheel))
     for of_wheel in (False, True):
         gear, roll = pair.gear(of_wheel=of_wheel), pair.roll_rad(position, of_wheel=of_wheel)
