@@ -21,6 +21,8 @@ from gearsim_sim.verify.machines import SEED, machine_of, model_names, params_of
 
 RATE_HZ = 4096.0
 KINDS = sorted(REGISTRY)
+# Play between teeth does nothing while the load presses them together; test_gear_faults takes the load away.
+AWAKE = [kind for kind in KINDS if kind != "gear_backlash"]
 
 
 def carriers(kind):
@@ -104,7 +106,7 @@ def test_severity_zero_changes_no_bit_of_another_fault(model):
     assert np.array_equal(with_faults(model, [acting, *others]), with_faults(model, [acting]))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", AWAKE)
 def test_a_small_severity_has_a_small_effect(kind):
     """A hundredth of the severity does at most a tenth of the effect, and the fault does something.
 
@@ -118,7 +120,7 @@ def test_a_small_severity_has_a_small_effect(kind):
         assert small < 0.1 * full, (model, small, full)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", AWAKE)
 def test_a_fault_grows_during_a_run(kind):
     """Nothing before it is injected, little in the first tenth of its ramp, all of it in the end."""
     model = carriers(kind)[0]

@@ -255,14 +255,14 @@ def _check(params: ParallelParams) -> None:
     teeth = params.mesh.driven_teeth / params.mesh.driving_teeth
     if abs(radii / teeth - 1) > 1e-9:
         raise InputError(where, "gear.base_radius", radii, f"radii in the ratio of the teeth, {teeth:.9g}")
-    _check_teeth(params)
+    _check_tooth_data(params)
     if model.drive.speed_hz > model.drive.speed_limit_hz:
         raise InputError(where, "drive.speed", model.drive.speed_hz, f"<= {model.drive.speed_limit_hz} Hz")
     if model.drive.load_nm > model.drive.load_limit_nm:
         raise InputError(where, "drive.load", model.drive.load_nm, f"<= {model.drive.load_limit_nm} N m")
 
 
-def _check_teeth(params: ParallelParams) -> None:
+def _check_tooth_data(params: ParallelParams) -> None:
     """The teeth must be there if they are needed, possible, and those of the model's base circles."""
     model, pair = params.model, params.gear_pair
     if pair is None:
