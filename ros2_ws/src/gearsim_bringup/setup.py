@@ -21,6 +21,7 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
+    package_data={NAME: ["bench/peers/*.txt"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

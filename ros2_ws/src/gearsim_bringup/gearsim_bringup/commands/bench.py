@@ -14,6 +14,7 @@ from gearsim_bringup.ui import Voice
 EXAMPLE = """
 ./gearsim bench
 ./gearsim bench --only sim --only dsp --json
+./gearsim bench --only sim --peers
 """
 
 
@@ -21,13 +22,17 @@ EXAMPLE = """
 @click.option(
     "--only", "groups", multiple=True, help="Group of figures, repeatable (default: all but setup)."
 )
+@click.option(
+    "--peers", is_flag=True, help="Install other programs (ROSS) beside this one first, to be measured too."
+)
 @json_option
-def command(groups: tuple[str, ...], json_mode: bool) -> int:
+def command(groups: tuple[str, ...], peers: bool, json_mode: bool) -> int:
     """Measure what the project promises: every figure as a ratio to a baseline of the same run.
 
     Groups: sim, dsp, bags, alarms, stream, and setup, which clones the project and sets it up anew.
     """
     from gearsim_bringup.bench.groups import DEFAULT, GROUPS
+    from gearsim_bringup.bench.peers import install
 
     unknown = [name for name in groups if name not in GROUPS]
     if unknown:
@@ -35,6 +40,8 @@ def command(groups: tuple[str, ...], json_mode: bool) -> int:
             f"got {unknown[0]!r}, expected one of {', '.join(GROUPS)}", param_hint="--only"
         )
     voice = Voice(json_mode=json_mode)
+    if peers:
+        install(voice)
     figures = []
     for name in groups or DEFAULT:
         voice.say(f"{name} ...")
