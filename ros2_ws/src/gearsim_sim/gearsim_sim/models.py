@@ -50,19 +50,30 @@ class RunningModel(Protocol):
         ...
 
 
-def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> RunningModel:
+def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> Any:
     params = load_parallel_params(scenario.machine_path, scenario.parameters, scenario.source)
-    return _engine(scenario, params.model_copy(update={"pedestals": pedestals}))
+    return params.model_copy(update={"pedestals": pedestals})
 
 
-def _planetary(scenario: Scenario) -> RunningModel:
-    params = load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
-    return _engine(scenario, params)
+def _planetary(scenario: Scenario) -> Any:
+    return load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
 
 
-def _engine(scenario: Scenario, params: Any) -> RunningModel:
+_PARAMETERS: Mapping[str, Callable[[Scenario], Any]] = {
+    "lpm22": partial(_parallel_shaft, pedestals=False),
+    "lpm34": partial(_parallel_shaft, pedestals=True),
+    "planetary18": _planetary,
+}
+
+
+def parameters(scenario: Scenario) -> Any:
+    """Parameters of the machine that a scenario runs, with what it replaces."""
+    return _PARAMETERS[scenario.model](scenario)
+
+
+def _engine(scenario: Scenario) -> RunningModel:
     return Engine(
-        params,
+        parameters(scenario),
         scenario.seed,
         scenario.sample_rate_hz,
         scenario.oversampling,
@@ -72,8 +83,4 @@ def _engine(scenario: Scenario, params: Any) -> RunningModel:
     )
 
 
-MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = {
-    "lpm22": partial(_parallel_shaft, pedestals=False),
-    "lpm34": partial(_parallel_shaft, pedestals=True),
-    "planetary18": _planetary,
-}
+MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = dict.fromkeys(_PARAMETERS, _engine)

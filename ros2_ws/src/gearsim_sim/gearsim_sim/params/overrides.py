@@ -62,6 +62,15 @@ def _quantity(value: Any) -> Any:
     return {"value": value, "unit": "", "source": _SOURCE}
 
 
+def split_quantity(value: Any) -> tuple[float, str]:
+    """Number and unit of a value as `override` takes it; ValueError if it has no number."""
+    quantity = _quantity(value)
+    try:
+        return float(quantity["value"]), str(quantity.get("unit", ""))
+    except (KeyError, TypeError, ValueError):
+        raise ValueError(f"{value!r} is no quantity") from None
+
+
 def _known(place: Any) -> str:
     if isinstance(place, dict) and "value" not in place:
         return "one of " + ", ".join(sorted(str(key) for key in place))
