@@ -25,7 +25,9 @@ class Coupling(Strict):
     """Torsional resonance of an encoder on its coupling: frequency, and amplification there (Q)."""
 
     resonance: Annotated[float, Si("Hz", ge=1, le=1e6)]
+    """Torsional resonance of the encoder on its coupling."""
     q: Annotated[float, Si("", ge=0.5, le=200)] = 20.0
+    """Amplification at the resonance (assumed: 20)."""
 
 
 def sections(resonance_hz: float, q: float, sample_rate_hz: float) -> tuple[Section, Section]:

@@ -26,7 +26,9 @@ class Drift(Strict, Generic[Amplitude]):
     """Standard deviation and time constant of the wandering zero."""
 
     rms: Amplitude
+    """Standard deviation of the wandering zero."""
     time: Annotated[float, Si("s", ge=0.05, le=1e6)] = 10.0
+    """Time constant of the wandering (assumed: 10 s)."""
 
 
 class ZeroDrift:

@@ -26,8 +26,11 @@ class Dropouts(Strict):
     """How often the signal is lost, for how long on average, and what the channel shows then."""
 
     rate: Annotated[float, Si("Hz", gt=0, le=1000)]
+    """Bursts per second: one over the mean time from the end of one to the start of the next."""
     duration: Annotated[float, Si("s", gt=0, le=100)] = 5e-3
+    """Mean length of a burst (assumed: 5 ms)."""
     shows: Literal["zero", "hold", "rail"] = "zero"
+    """What the channel gives meanwhile: zero, its last value, or the end of its range."""
 
 
 class _Line:

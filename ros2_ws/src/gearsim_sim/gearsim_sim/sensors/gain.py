@@ -23,19 +23,20 @@ Array = NDArray[np.float64]
 
 
 class Temperature(Strict):
-    """How warm the sensor gets, and what that does to its sensitivity.
-
-    `coefficient` is the relative change of sensitivity per kelvin; `offset` the temperature over that of the
-    calibration at sample 0, to which `rise` is added within some times `time`; `wander` is the standard
-    deviation of a random course with the time constant `wander_time`.
-    """
+    """How warm the sensor gets, and what that does to its sensitivity."""
 
     coefficient: Annotated[float, Si("1/K", ge=-0.1, le=0.1)]
+    """Relative change of the sensitivity per kelvin."""
     offset: Annotated[float, Si("delta_degC", ge=-300, le=300)] = 0.0
+    """Temperature at sample 0 over that of the calibration."""
     rise: Annotated[float, Si("delta_degC", ge=-300, le=300)] = 0.0
+    """By how much the sensor warms up in the end."""
     time: Annotated[float, Si("s", ge=1, le=1e6)] = 600.0
+    """Time constant of the warming up (assumed: 10 min)."""
     wander: Annotated[float, Si("delta_degC", ge=0, le=50)] = 0.0
+    """Standard deviation of a random course of the temperature."""
     wander_time: Annotated[float, Si("s", ge=1, le=1e6)] = 60.0
+    """Time constant of that course (assumed: 1 min)."""
 
 
 class _Heat:

@@ -28,7 +28,9 @@ class HighPass(Strict):
     """Corner (-3 dB) and order, 1 or 2, of the high-pass."""
 
     corner: Annotated[float, Si("Hz", ge=0.01, le=1e4)]
+    """Frequency at which the high-pass is 3 dB down."""
     order: Literal[1, 2] = 1
+    """Order of the Butterworth high-pass; 1 is a single coupling capacitor."""
 
 
 def highpass(corner_hz: float, order: int, sample_rate_hz: float) -> Section:

@@ -34,20 +34,29 @@ class Mains(Strict, Generic[Amplitude]):
     """Hum: amplitude (peak) of the fundamental, and of its harmonics relative to it."""
 
     amplitude: Amplitude
+    """Peak of the line at the mains frequency."""
     frequency: Annotated[float, Si("Hz", ge=10, le=1000)] = 50.0
+    """Frequency of the mains."""
     harmonics: dict[Order, Annotated[float, Si("", ge=0, le=100)]] = Field(
         default_factory=lambda: {2: 0.1, 3: 0.4, 5: 0.2, 7: 0.1}
     )
+    """Peaks of the harmonics, by order, in parts of the fundamental's (assumed: 2: 0.1, 3: 0.4, 5: 0.2, 7:
+    0.1)."""
 
 
 class Inverter(Strict, Generic[Amplitude]):
     """Pulse-width modulation coupled in by stray capacitance: amplitude (peak) of the carrier's own line."""
 
     amplitude: Amplitude
+    """Peak of the line at the carrier frequency."""
     carrier: Annotated[float, Si("Hz", ge=100, le=1e5)] = 4000.0
+    """Switching frequency (assumed: 4 kHz, a usual setting)."""
     output: Annotated[float, Si("Hz", ge=1, le=1000)] = 50.0
+    """Frequency that the inverter gives its motor; does not follow the shaft."""
     modulation: Annotated[float, Si("", ge=0, le=1)] = 0.8
+    """Index of modulation, wanted amplitude over the largest."""
     multiples: Annotated[int, Field(ge=1, le=16)] = 4
+    """Groups of lines around multiples of the carrier; those beyond half the sensors' rate are left out."""
 
 
 class PhaseClock:

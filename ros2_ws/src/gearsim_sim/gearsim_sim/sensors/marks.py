@@ -29,24 +29,28 @@ _LARGEST_DEVIATE = 8.3  # that `normal` can give
 
 
 class Pickup(Strict):
-    """Errors of a tacho or an encoder; all are off by default.
-
-    `mark_error` is the standard deviation of a mark's place in parts of the marks' distance, `eccentricity`
-    the amplitude of an error once per turn, `missing_marks` are never seen, `missing` and `double` are
-    probabilities per mark, `double_after` the time until the second pulse, `clock` the rate of the clock that
-    takes the times.
-    """
+    """Errors of a tacho or an encoder; all are off by default."""
 
     jitter: Annotated[float, Si("s", ge=0, le=1e-3)] = 0.0
+    """Standard deviation of the pulses' times."""
     delay: Annotated[float, Si("s", ge=0, le=0.1)] = 0.0
+    """By how much all pulses come late."""
     missing: Annotated[float, Si("", ge=0, le=0.9)] = 0.0
+    """Probability that a mark is missed."""
     double: Annotated[float, Si("", ge=0, le=0.9)] = 0.0
+    """Probability that a pulse comes twice."""
     double_after: Annotated[float, Si("s", gt=0, le=0.1)] = 1e-4
+    """Time from a pulse to its double (assumed: 100 us)."""
     mark_error: Annotated[float, Si("", ge=0, le=0.1)] = 0.0
+    """Standard deviation of the marks' places, in parts of their distance; a fixed pattern."""
     eccentricity: Annotated[float, Si("rad", ge=0, le=0.1)] = 0.0
+    """Amplitude of an error of angle once per turn."""
     missing_marks: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    """Numbers of marks that are never seen, counted from the one at angle 0."""
     clock: Annotated[float | None, SiOrOff("Hz", ge=1e3, le=1e10)] = None
+    """Rate of the clock that takes the times, at its next edge; off: exact times."""
     coupling: Annotated[Coupling | None, OrOff()] = None
+    """Resonance of a soft coupling in front of the encoder."""
 
 
 def mark_errors(name: str, marks: int, pickup: Pickup, seed: int) -> Array | None:

@@ -41,8 +41,11 @@ class Mounting(Strict):
     """Mounted resonance: frequency, and amplification there (Q)."""
 
     resonance: Annotated[float, Si("Hz", ge=10, le=1e6)]
+    """Frequency of the sensor on its mounting."""
     q: Annotated[float, Si("", ge=0.5, le=200)]
+    """Amplification at the resonance."""
     description: str = ""
+    """One line for people."""
 
 
 class _Mountings(RootModel[dict[str, Mounting]]):

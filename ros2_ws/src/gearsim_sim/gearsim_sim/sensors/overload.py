@@ -29,7 +29,9 @@ class Overload(Strict):
     """Time constants of the leakage during an overload, and of the recovery after it."""
 
     leak: Annotated[float, Si("s", gt=0, le=10)] = 2e-3
+    """Time constant with which charge leaks away during an overload (assumed: 2 ms)."""
     recovery: Annotated[float, Si("s", gt=0, le=100)] = 50e-3
+    """Time constant with which the zero comes back after it (assumed: 50 ms)."""
 
 
 class OverloadRecovery:

@@ -29,10 +29,18 @@ class Sampling(Strict):
     """How the converter samples: the sensors work at `oversampling` times the sample rate."""
 
     oversampling: Annotated[int, Field(ge=1, le=16)] = 1
+    """Samples that the sensors work with per sample that goes out; above 1 the analogue effects act at
+    that rate."""
     antialias: Literal["delta_sigma", "none"] = "delta_sigma"
+    """What stands before the samples are taken: the filter of a delta-sigma converter, or none (then all
+    above half the sample rate folds)."""
     pass_band: Annotated[float, Si("", ge=0.1, le=0.5)] = 0.45
+    """Up to where the filter is flat, in parts of the sample rate (NI 9234: 0.45)."""
     stop_band: Annotated[float, Si("", ge=0.45, le=0.9)] = 0.55
+    """From where on the filter is shut, in parts of the sample rate (NI 9234: 0.55)."""
     rejection_db: Annotated[float, Si("", ge=40, le=140)] = 100.0
+    """How far the filter is down beyond the stop band, and its ripple below the pass band, in dB (NI 9234:
+    100)."""
 
     @model_validator(mode="after")
     def _sensible(self) -> Sampling:

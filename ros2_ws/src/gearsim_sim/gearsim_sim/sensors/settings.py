@@ -64,12 +64,19 @@ class Effects(Strict):
     """The numbers of a chain that do not depend on what it measures; what is left out stays as it is."""
 
     bandwidth: Annotated[MaybeFloat, SiOrOff("Hz", gt=0)] = None
+    """Frequency at which the second-order roll-off is 3 dB down; left out above 0.49 of the sensors' rate."""
     noise_corner: Annotated[MaybeFloat, SiOrOff("Hz", gt=0.01, le=1e5)] = None
+    """Frequency below which noise rises as 1/f above the white noise."""
     adc_bits: AdcBits = None
+    """Word length of the converter over the whole range, both signs."""
     delay: Annotated[float, Si("s", ge=0, le=1)] = 0.0
+    """By how much the channel comes later than the motion."""
     gain_error: Annotated[float, Si("", gt=-1, le=1)] = 0.0
+    """Relative error of the sensitivity."""
     temperature: Annotated[Temperature | None, OrOff()] = None
+    """What temperature does to the sensitivity."""
     dropouts: Annotated[Dropouts | None, OrOff()] = None
+    """Bursts in which the signal is lost."""
 
     @model_validator(mode="after")
     def _whole_bits(self) -> Effects:
@@ -94,46 +101,68 @@ class AccelerometerEffects(Effects):
     """The numbers of an accelerometer's chain."""
 
     range: Annotated[MaybeFloat, SiOrOff("m/s^2", gt=0)] = None
+    """Largest magnitude; beyond it the signal is clipped."""
     noise_density: Annotated[MaybeFloat, SiOrOff("m/s^2/Hz^0.5", ge=0)] = None
+    """One-sided density of the white noise."""
     offset: Annotated[float, Si("m/s^2")] = 0.0
+    """Error of the zero."""
     mounting: Annotated[Mounting | None, BeforeValidator(_named_mounting)] = None
+    """How the sensor is fixed: a shipped name, or resonance and q."""
     high_pass: Annotated[HighPass | None, OrOff()] = None
+    """AC coupling."""
     drift: Annotated[Drift[Accel] | None, OrOff()] = None
+    """Wandering zero."""
     mains: Annotated[Mains[Accel] | None, OrOff()] = None
+    """Hum."""
     inverter: Annotated[Inverter[Accel] | None, OrOff()] = None
+    """Lines of a frequency converter."""
     overload: Annotated[Overload | None, OrOff()] = None
+    """Slow recovery from clipping, as of a charge amplifier."""
 
 
 class TorqueEffects(Effects):
     """The numbers of a torque transducer's chain."""
 
     range: Annotated[MaybeFloat, SiOrOff("N*m", gt=0)] = None
+    """Largest magnitude; beyond it the signal is clipped."""
     noise_density: Annotated[MaybeFloat, SiOrOff("N*m/Hz^0.5", ge=0)] = None
+    """One-sided density of the white noise."""
     offset: Annotated[float, Si("N*m")] = 0.0
+    """Error of the zero."""
     zero_per_k: Annotated[float, Si("N*m/K")] = 0.0
+    """Shift of the zero per kelvin of `temperature`."""
     drift: Annotated[Drift[Torque] | None, OrOff()] = None
+    """Wandering zero."""
     mains: Annotated[Mains[Torque] | None, OrOff()] = None
+    """Hum."""
     inverter: Annotated[Inverter[Torque] | None, OrOff()] = None
+    """Lines of a frequency converter."""
 
 
 class OneAccelerometer(AccelerometerEffects):
     """Changes of one channel; `site` lets it look elsewhere, `cross_axis` adds parts of other sites."""
 
     site: Sites = None
+    """Place and direction of the model that the channel looks at, or several with weights; default: that
+    of its name."""
     axis: str | None = None
+    """Direction, for people."""
     cross_axis: Annotated[Mix | None, OrOff(), BeforeValidator(_mix)] = None
+    """Other sites that come through, with the parts of them that do."""
 
 
 class AccelerometerChain(AccelerometerEffects):
     """A chain of the catalogue for accelerometers."""
 
     description: str = ""
+    """One line for people."""
 
 
 class TorqueChain(TorqueEffects):
     """A chain of the catalogue for torque transducers."""
 
     description: str = ""
+    """One line for people."""
 
 
 class AccelerometersModel(Strict):
@@ -144,44 +173,63 @@ class AccelerometersModel(Strict):
     """
 
     chain: str = "lab"
+    """Measuring chain out of the catalogue."""
     channels: tuple[str, ...] | None = Field(default=None, min_length=1)
+    """Channels that exist; default: all of the machine."""
     sampling: Sampling = Sampling()
+    """How the converter samples all of them."""
     all: AccelerometerEffects = AccelerometerEffects()
+    """Changes of every channel."""
     each: dict[str, OneAccelerometer] = Field(default_factory=dict)
+    """Changes of single channels."""
 
 
 class TorquesModel(Strict):
     """Shafts with a torque transducer (default: none), each a channel `<shaft>_torque`."""
 
     chain: str = "strain_gauge"
+    """Measuring chain out of the catalogue."""
     shafts: tuple[str, ...] = ()
+    """Shafts with a torque transducer; default: none."""
     all: TorqueEffects = TorqueEffects()
+    """Changes of every transducer."""
     each: dict[str, TorqueEffects] = Field(default_factory=dict)
+    """Changes of single ones, by shaft."""
 
 
 class TachosModel(Pickup):
     """Shafts with a tacho (default: those of the machine); `each` changes single ones."""
 
     shafts: tuple[str, ...] | None = None
+    """Shafts with a tacho; default: those of the machine."""
     pulses: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """Pulses per turn."""
     each: dict[str, Pickup] = Field(default_factory=dict)
+    """Errors of single tachos, by shaft."""
 
 
 class EncodersModel(Pickup):
     """Shafts with an encoder (default: those of the machine); `each` changes single ones."""
 
     shafts: tuple[str, ...] | None = None
+    """Shafts with an encoder; default: those of the machine."""
     lines: Annotated[int, Field(ge=1, le=100_000)] = 900
+    """Lines per turn."""
     each: dict[str, Pickup] = Field(default_factory=dict)
+    """Errors of single encoders, by shaft."""
 
 
 class SensorsModel(Strict):
     """The `sensors` section of a scenario."""
 
     accelerometers: AccelerometersModel = AccelerometersModel()
+    """Accelerometers."""
     tachos: TachosModel = TachosModel()
+    """Tachos."""
     encoders: EncodersModel = EncodersModel()
+    """Encoders."""
     torques: TorquesModel = TorquesModel()
+    """Torque transducers."""
 
 
 _KINDS: Mapping[str, type[AccelerometerChain] | type[TorqueChain]] = {
