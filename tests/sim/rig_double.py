@@ -28,6 +28,11 @@ class RigDouble:
     def earliest_event_sample(self):
         return 0 if self.next_sample == 0 else self.next_sample + LOOKAHEAD
 
+    steady = True
+
+    def operating_point_at(self, sample):
+        raise AssertionError("nobody needs that of a steady rig")
+
     def angle_turns(self, sample, shaft=0):
         """Closed-form angle: a steady turn, a mesh ripple and a slow wander; exact derivative in `speed`."""
         t = np.asarray(sample, dtype=float) / self.rate_hz

@@ -18,6 +18,7 @@ from gearsim_sim.model.plant import Moment
 from gearsim_sim.model.plants import make_plant
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.params import load_parallel_params
+from gearsim_sim.profile.profile import constant_profile
 from gearsim_sim.schedule import ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Stepper
 
@@ -39,7 +40,8 @@ def fault_of(gearbox, kind):
 
 
 def engine_accelerations(gearbox, fault, oversampling):
-    schedule = Schedule(gearbox, 1 / (RATE_HZ * oversampling), 0, TURNS, SPEED_HZ, LOAD_NM)
+    course = constant_profile(gearbox, 1 / (RATE_HZ * oversampling), SPEED_HZ, LOAD_NM)
+    schedule = Schedule(gearbox, course, 0, TURNS)
     if fault is not None:
         schedule.faults["spall"] = ActiveFault(fault, Severity(1.0, 1.0, 0, 0.0))
     stepper = Stepper(gearbox, schedule, gearbox.sites, oversampling)

@@ -374,10 +374,11 @@ def test_one_row_of_balls_works_too(params):
 
 def test_long_runs_keep_their_digits(params):
     """After ten days of turning, an anchor's fraction is as good as at the start."""
+    from gearsim_sim.profile.profile import constant_profile
     from gearsim_sim.schedule import Schedule
 
     plant = make_plant(params, 1)
-    schedule = Schedule(plant, 1 / 262144, 0, 0.5, 10.0, 50.0)
+    schedule = Schedule(plant, constant_profile(plant, 1 / 262144, 10.0, 50.0), 0, 0.5)
     for number in range(1, 40001):
         schedule.rebase(number * 65536)
     exact = 0.5 + 10.0 * 40000 * 65536 / 262144

@@ -17,7 +17,6 @@ from gearsim_sim.model.gear_errors import gear_error, pitch_series
 from gearsim_sim.model.gear_mesh import stiffness_series
 from gearsim_sim.model.periodic import merged, sinusoid
 from gearsim_sim.params import load_parallel_params
-from gearsim_sim.schedule import ramp, steady
 
 
 @pytest.fixture(scope="module")
@@ -147,20 +146,3 @@ def test_polynomials_and_their_derivatives():
     for u in (0.0, 0.3, 1.0, -2.5):
         expected = [reference(u), reference.deriv()(u), reference.deriv(2)(u)]
         assert plain_polynomial(u, coefficients) == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_ramp_of_speed_takes_over_what_it_finds():
-    """Angle, speed and acceleration run on at both ends, and the angle is the integral of the speed."""
-    step_s, steps = 1 / 262144, 50_000
-    first = ramp(steady(0, step_s, 10.0, 50.0), 0, 12.0, 50.0, 100_000)
-    second = ramp(first, 40_000, 8.0, 70.0, steps)
-    for name in ("speed_hz", "acceleration_hz_per_s", "load_nm"):
-        assert getattr(second, name)(40_000) == pytest.approx(getattr(first, name)(40_000), rel=1e-12)
-    end = 40_000 + steps
-    assert (second.end_step, second.speed_hz(end), second.load_nm(end)) == pytest.approx((end, 8.0, 70.0))
-    assert second.acceleration_hz_per_s(end) == pytest.approx(0.0, abs=1e-6)
-    at = np.arange(40_000, end + 1)
-    speed = np.array([second.speed_hz(step) for step in at])
-    assert second.turns_at(end) == pytest.approx(np.trapezoid(speed, dx=step_s), rel=1e-9)
-    slope = np.gradient(speed, step_s)[1:-1]
-    assert slope == pytest.approx([second.acceleration_hz_per_s(step) for step in at[1:-1]], abs=1e-3)

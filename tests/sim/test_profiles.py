@@ -14,7 +14,7 @@ from gearsim_sim.profile.curve import Constant, Laid, Stretch, hermite_stretch, 
 from gearsim_sim.profile.dynamics import LawLoad, Rotor, TorqueSpeed, settles_at
 from gearsim_sim.profile.laws import ConstantMotor, ControlledMotor, CurveMotor, LoadShape
 from gearsim_sim.profile.noise import RandomLoad
-from gearsim_sim.profile.profile import Profile, constant_profile
+from gearsim_sim.profile.profile import Profile
 from gearsim_sim.profile.settings import ProfileModel
 from gearsim_sim.profile.trace import Trace, read_columns, trace_curve
 
@@ -64,20 +64,20 @@ def assert_smooth(segments, accel_scale):
     for a, b in itertools.pairwise(segments):
         assert a.end_step == b.start_step
         at = a.end_step
-        assert b.speed_hz_at(at) == pytest.approx(a.speed_hz_at(at), abs=1e-9)
-        jump = b.acceleration_hz_per_s_at(at) - a.acceleration_hz_per_s_at(at)
+        assert b.speed_hz(at) == pytest.approx(a.speed_hz(at), abs=1e-9)
+        jump = b.acceleration_hz_per_s(at) - a.acceleration_hz_per_s(at)
         assert abs(jump) < 1e-6 * accel_scale
-        assert b.load_nm[0] == pytest.approx(np.sum(a.load_nm), abs=1e-8)
-        assert b.motor_nm[0] == pytest.approx(np.sum(a.motor_nm), abs=1e-5 * accel_scale)
+        assert b.load[0] == pytest.approx(np.sum(a.load), abs=1e-8)
+        assert b.motor[0] == pytest.approx(np.sum(a.motor), abs=1e-5 * accel_scale)
 
 
 def test_a_constant_point_is_exact_and_steady():
-    course = constant_profile(10.0, 50.0, step_s=STEP_S, ratio=RATIO, inertia_kg_m2=J)
+    course = profile(Constant(10.0), Constant(50.0))
     for step in (-70000, 0, 65535, 65536, 86400 * 262144 + 5):
         segment = course.segment(step)
         assert segment.steady
         assert segment.turns_at(step) == pytest.approx((step - segment.start_step) * STEP_S * 10.0, rel=1e-15)
-        assert (segment.load_nm[0], segment.motor_nm[0]) == (50.0, 25.0)
+        assert (segment.load[0], segment.motor[0]) == (50.0, 25.0)
 
 
 def test_a_ramp_is_the_polynomial_it_was():
@@ -90,16 +90,16 @@ def test_a_ramp_is_the_polynomial_it_was():
     course = profile(curve, Constant(30.0))
     turns, at = 0.0, start
     for segment in walk(course, start, start + int(steps) + 1000):
-        for step in (segment.start_step, segment.start_step + segment.steps // 3):
+        for step in (segment.start_step, segment.start_step + int(segment.length_steps) // 3):
             since = float(step - start)
             value, slope, integral = plain_ramp(since, steps)
             fade, fade_slope, fade_integral = plain_fading_slope(since, steps)
             before = first.stretch(start).value(float(start))
             change = 9.0 - before
             want = before + change * value + slope0 * fade
-            assert segment.speed_hz_at(step) == pytest.approx(want, abs=1e-11)
+            assert segment.speed_hz(step) == pytest.approx(want, abs=1e-11)
             want = (change * slope + slope0 * fade_slope) / STEP_S
-            assert segment.acceleration_hz_per_s_at(step) == pytest.approx(want, abs=1e-7)
+            assert segment.acceleration_hz_per_s(step) == pytest.approx(want, abs=1e-7)
             want = STEP_S * (before * since + change * integral + slope0 * fade_integral)
             assert turns + segment.turns_at(step) == pytest.approx(want, abs=1e-12)
         turns += segment.turns_at(segment.end_step)
@@ -123,11 +123,11 @@ def energies(course, first, last):
     work = taken = 0.0
     for segment in walk(course, first, last):
         u = 0.5 * (nodes + 1)
-        steps = segment.start_step + u * segment.steps
-        rate = np.array([segment.speed_hz_at(step) for step in steps]) * 2 * math.pi
-        motor = np.polynomial.polynomial.polyval(u, segment.motor_nm)
-        load = np.polynomial.polynomial.polyval(u, segment.load_nm)
-        scale = 0.5 * weights * segment.steps * STEP_S
+        steps = segment.start_step + u * segment.length_steps
+        rate = np.array([segment.speed_hz(step) for step in steps]) * 2 * math.pi
+        motor = np.polynomial.polynomial.polyval(u, segment.motor)
+        load = np.polynomial.polynomial.polyval(u, segment.load)
+        scale = 0.5 * weights * segment.length_steps * STEP_S
         work += scale @ (motor * rate)
         taken += RATIO * (scale @ (load * rate))
     return work, taken
@@ -148,7 +148,7 @@ def test_run_up_from_rest_is_the_exponential():
         want = 20.0 * (1 - math.exp(-rate * risen))
         assert speed.stretch(step).value(float(step)) == pytest.approx(want, abs=2e-8)
     assert speed.stretch(-5).value(-5.0) == 0.0
-    assert speed.final_value() == pytest.approx(20.0, abs=1e-7)
+    assert speed.at_rest() == pytest.approx(20.0, abs=1e-7)
     assert_smooth(walk(profile(speed, Constant(0.0)), -1000, seconds(4.0)), 10.0)
 
 
@@ -163,7 +163,7 @@ def test_quadratic_load_gives_the_hyperbolic_tangent():
         effective = seconds(time_s) * STEP_S - 0.025
         found = speed.stretch(seconds(time_s)).value(float(seconds(time_s)))
         assert found == pytest.approx(final * math.tanh(k * effective), abs=2e-8)
-    assert speed.final_value() == pytest.approx(final, abs=1e-7)
+    assert speed.at_rest() == pytest.approx(final, abs=1e-7)
 
 
 def test_energy_of_torque_dynamics():
@@ -176,11 +176,11 @@ def test_energy_of_torque_dynamics():
     end = seconds(6.0)
     work, taken = energies(course, 0, end)
     segment = course.segment(end)
-    kinetic = 0.5 * J * (2 * math.pi * segment.speed_hz_at(segment.start_step)) ** 2
+    kinetic = 0.5 * J * (2 * math.pi * segment.speed_hz(segment.start_step)) ** 2
     work, taken = energies(course, 0, segment.start_step)
     assert taken > 100.0
     assert work == pytest.approx(kinetic + taken, rel=1e-10)
-    assert speed.final_value() == pytest.approx(10.0, abs=1e-6)
+    assert speed.at_rest() == pytest.approx(10.0, abs=1e-6)
     for step in range(0, end, 100003):  # the laws themselves, point by point
         v = course.speed_at(step)
         assert course.load_at(step) == pytest.approx(rated.stretch(step).value(step) * shape(v), abs=1e-7)
@@ -210,7 +210,7 @@ def test_another_load_during_torque_dynamics():
     assert new.value(float(step)) == pytest.approx(old.value(float(step)), abs=1e-10)
     assert new.slope(float(step)) == pytest.approx(old.slope(float(step)), abs=1e-13)
     # 60 (1 - v/10) = 0.5 * 60 v/10
-    assert after.final_value() == pytest.approx(60 / 9, abs=1e-7)
+    assert after.at_rest() == pytest.approx(60 / 9, abs=1e-7)
 
 
 def test_a_motor_that_is_too_weak_settles_below():
@@ -218,7 +218,7 @@ def test_a_motor_that_is_too_weak_settles_below():
     weak = rotor(ConstantMotor(10.0), shape=fan)
     assert settles_at(weak, 0.0, 50.0, 30.0) == pytest.approx(10.0 * math.sqrt(0.4), rel=1e-9)
     assert settles_at(rotor(ConstantMotor(10.0)), 0.0, 0.0, 30.0) == math.inf
-    assert settles_at(rotor(ConstantMotor(10.0)), 8.0, 50.0, 30.0) == 0.0
+    assert settles_at(rotor(ConstantMotor(10.0)), 8.0, 50.0, 30.0) < 0.05  # it crawls
 
 
 def measured(points, noise=0.0):
@@ -238,8 +238,8 @@ def test_a_measured_trace_is_met_at_its_points_and_between():
     assert np.abs(found - fine_v).max() < 1e-4  # degree 5 through 33 points per period
     segments = walk(course, -80000, seconds(9.0))
     assert_smooth(segments, 6.0)
-    assert segments[0].speed_hz_at(segments[0].start_step) == speed[0]
-    assert segments[-1].speed_hz_at(segments[-1].end_step) == pytest.approx(speed[-1], abs=1e-12)
+    assert segments[0].speed_hz(segments[0].start_step) == speed[0]
+    assert segments[-1].speed_hz(segments[-1].end_step) == pytest.approx(speed[-1], abs=1e-12)
 
 
 def test_a_noisy_trace_is_smoothed_to_its_tolerance():
@@ -268,7 +268,10 @@ def test_a_trace_through_rest_stays_at_rest():
     segments = walk(profile(curve, Constant(20.0)), -1000, seconds(8.0))
     assert_smooth(segments, 6.0)
     assert (
-        min(s.speed_hz_at(at) for s in segments for at in (s.start_step, s.start_step + s.steps // 2)) > -1e-9
+        min(
+            s.speed_hz(at) for s in segments for at in (s.start_step, s.start_step + int(s.length_steps) // 2)
+        )
+        > -1e-9
     )
 
 
@@ -379,8 +382,8 @@ def test_profiles_of_a_scenario(tmp_path):
     assert course.speed_at(seconds(4.0)) == pytest.approx(10.8, abs=1e-9)
     assert course.load_at(seconds(4.0)) == pytest.approx(44.0, abs=1e-9)
     course = built({"load_noise": {"rms": "2 N*m", "high": "20 Hz"}})
-    assert np.any(course.segment(5).fluctuation_nm)
-    assert course.segment(5).motor_nm[0] == 25.0
+    assert np.any(course.segment(5).fluctuation)
+    assert course.segment(5).motor[0] == 25.0
 
 
 @pytest.mark.parametrize(
@@ -420,3 +423,41 @@ def test_traces_beyond_the_drive_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"Hz/s at .* at most 8.29 Hz/s.*tolerance"):
         built({"trace": {"file": "t.csv"}}, speed=None, folder=tmp_path)
     assert built({"trace": {"file": "t.csv", "tolerance": "0.6 Hz"}}, speed=None, folder=tmp_path)
+
+
+def test_events_change_what_they_name():
+    """A new load leaves a trace alone; under a law of torques the speed answers; a new speed ends the law."""
+    time_s, speed = measured(81)
+    curve = trace_curve(Trace("t.csv", time_s, speed), STEP_S, 0.0, "speed")
+    step, later = seconds(3.0), seconds(7.0)
+    course = profile(curve, Constant(20.0))
+    loaded = course.changed(step, None, 40.0, 1e5)
+    assert loaded.speed_at(later) == course.speed_at(later)
+    assert (loaded.load_at(step), loaded.load_at(later)) == (20.0, 40.0)
+    taken = course.changed(step, 9.0, None, 1e5)
+    assert_smooth(walk(course, step - 1000, step) + walk(taken, step, later), 6.0)
+    assert taken.speed_at(later) == 9.0
+    course = built({"torques": {"motor": {"controller": CONTROLLER}}, "load_law": {"linear": 1.0}})
+    loaded = course.changed(step, None, 80.0, 1e5)
+    joint = walk(course, step - 1000, step) + walk(loaded, step, later)
+    assert_smooth(joint, 6.0)
+    assert min(one.speed_hz(one.start_step) for one in joint) < 9.9  # the controller has to catch up
+    assert loaded.speed_at(seconds(30.0)) == pytest.approx(10.0, abs=1e-6)
+    assert loaded.load_at(seconds(30.0)) == pytest.approx(80.0, abs=1e-4)
+    taken = loaded.changed(later, 5.0, None, 1e5)
+    assert (taken.speed_at(seconds(9.0)), taken.load_at(seconds(9.0))) == pytest.approx((5.0, 40.0))
+
+
+def test_turns_between_is_the_integral_of_the_speed():
+    time_s, speed = measured(81)
+    course = profile(trace_curve(Trace("t.csv", time_s, speed), STEP_S, 0.0, "speed"), Constant(20.0))
+    steps = np.linspace(seconds(1.0), seconds(5.0), 4097)
+    values = np.array([course.speed_hz.stretch(int(s)).value(s) for s in steps])
+    exact = course.turns_between(seconds(1.0), seconds(5.0))
+    weights = np.tile([2.0, 4.0], 2048)
+    weights[0] = 1.0
+    simpson = (weights @ values[:-1] + values[-1]) / (3 * 4096) * 4.0
+    assert exact == pytest.approx(simpson, rel=1e-9)
+    assert course.turns_between(seconds(1.0), seconds(2.0) + 77) + course.turns_between(
+        seconds(2.0) + 77, seconds(5.0)
+    ) == pytest.approx(exact, rel=1e-14)

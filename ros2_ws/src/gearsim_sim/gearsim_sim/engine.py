@@ -16,6 +16,9 @@ from gearsim_sim.integrate.decimate import HALF_LENGTH_SAMPLES, decimate, padded
 from gearsim_sim.model.assembly import Vector
 from gearsim_sim.model.plant import Plant, RotatingSite
 from gearsim_sim.model.plants import make_plant
+from gearsim_sim.model.rotating_force import RotatingForce
+from gearsim_sim.operation import Operation
+from gearsim_sim.profile.profile import Profile
 from gearsim_sim.schedule import REBASE_STEPS, ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Motion, Stepper
 from gearsim_sim.timeline import Timeline
@@ -89,6 +92,8 @@ class Engine:
     probes : sequence of str
         Further outputs out of `probe_names`: displacement of a bearing or of a mesh (without
         transmission error), contact force of the shaft on the pedestal, force of the mesh.
+    operation : Operation, optional
+        Operating profile, ripple and added structure; without it speed and load change by events only.
 
     Raises
     ------
@@ -108,15 +113,20 @@ class Engine:
         load_nm: float | None = None,
         sites: Sites | None = None,
         probes: Sequence[str] = (),
+        operation: Operation | None = None,
     ) -> None:
         check_numbers(seed, sample_rate_hz, oversampling)
         self.params = params
         self.sample_rate_hz = float(sample_rate_hz)
         self._steps = max(oversampling, math.ceil(MIN_STEP_RATE_HZ / sample_rate_hz))
-        self.plant = make_plant(params, seed)
+        self._operation = Operation() if operation is None else operation
+        self.plant = self._operation.machine(make_plant(params, seed))
         self._timeline = Timeline(self.plant, seed, self.sample_rate_hz, self._steps)
         limits = self.plant.limits
-        speed_hz = self._timeline.checked_speed(limits.speed_hz if speed_hz is None else speed_hz)
+        if speed_hz is None and self._operation.profile.trace is None:
+            speed_hz = limits.speed_hz
+        if speed_hz is not None:
+            speed_hz = self._timeline.checked_speed(speed_hz)
         load_nm = self._timeline.checked_load(limits.load_nm if load_nm is None else load_nm)
         self._sites = checked_sites(self.plant.sites if sites is None else sites, self.plant.system.dof_names)
         self._probes = tuple(probes)
@@ -124,16 +134,18 @@ class Engine:
         for name in self._probes:
             if name not in self._probe_names:
                 raise InputError("engine", "probes", name, "one of " + ", ".join(self._probe_names))
-        self._prepare(speed_hz, load_nm, faults)
+        self._prepare(seed, speed_hz, load_nm, faults)
         self._settle()
         self.warm_up()
 
-    def _prepare(self, speed_hz: float, load_nm: float, faults: Sequence[FaultSpec]) -> None:
+    def _prepare(
+        self, seed: int, speed_hz: float | None, load_nm: float, faults: Sequence[FaultSpec]
+    ) -> None:
         """Static equilibrium at the step where settling begins."""
         step_rate_hz = self.sample_rate_hz * self._steps
-        self._schedule = first_schedule(
-            self.plant, self._timeline, self._steps, step_rate_hz, speed_hz, load_nm, faults
-        )
+        course = self._operation.course(self.plant, 1.0 / step_rate_hz, speed_hz, load_nm, seed)
+        forces = self._operation.forces(self.plant)
+        self._schedule = first_schedule(self.plant, self._timeline, self._steps, course, faults, forces)
         probed = bool(self._probes)
         self._stepper = Stepper(self.plant, self._schedule, self._sites, self._steps, probed=probed)
         self._taps = padded_taps(self._steps)
@@ -184,8 +196,18 @@ class Engine:
 
     @property
     def operating_point(self) -> tuple[float, float]:
-        """Speed [Hz] and load [N m] that the latest begun ramp leads to."""
-        return self._schedule.segment.end_speed_hz, self._schedule.segment.end_load_nm
+        """Speed [Hz] and load [N m] that the present profile leads to."""
+        profile = self._schedule.profile
+        return profile.speed_hz.final_value(), profile.load_nm.final_value()
+
+    @property
+    def steady(self) -> bool:
+        """Whether speed and load change by events only."""
+        return self._schedule.profiles[0][1].constant
+
+    def operating_point_at(self, sample: int) -> tuple[float, float]:
+        """Speed of the reference shaft [Hz] and load [N m] at a sample that has been handed out."""
+        return self._schedule.operating_point(sample * self._steps)
 
     def warm_up(self) -> None:
         """Compile everything that `advance` uses; the constructor has done so already."""
@@ -319,19 +341,17 @@ def first_schedule(
     plant: Plant,
     timeline: Timeline,
     steps_per_sample: int,
-    step_rate_hz: float,
-    speed_hz: float,
-    load_nm: float,
+    course: Profile,
     faults: Sequence[FaultSpec],
+    forces: Sequence[RotatingForce] = (),
 ) -> Schedule:
-    """Operating point and faults from the step on where settling begins."""
-    step_s = 1.0 / step_rate_hz
-    first = -HALF_LENGTH_SAMPLES * steps_per_sample - math.ceil(SETTLING_S / step_s)
-    schedule = Schedule(plant, step_s, first, _START_TURNS + speed_hz * first * step_s, speed_hz, load_nm)
+    """Operating profile and faults from the step on where settling begins."""
+    first = -HALF_LENGTH_SAMPLES * steps_per_sample - math.ceil(SETTLING_S / course.step_s)
+    schedule = Schedule(plant, course, first, _START_TURNS - course.turns_between(first, 0), forces)
     for spec in faults:
         fault = timeline.initial_fault(spec, first)
         severity = Severity(fault.severity, fault.severity, first, 0.0)
-        schedule.faults[spec.name] = ActiveFault(fault, severity)
+        schedule.faults[spec.name] = ActiveFault(fault, severity, schedule.new_serial())
     return schedule
 
 

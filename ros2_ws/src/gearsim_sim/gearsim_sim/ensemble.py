@@ -28,6 +28,7 @@ from gearsim_sim.model.faults import fault_kind
 from gearsim_sim.model.loop_data import NEED_RATES
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.plants import make_plant
+from gearsim_sim.profile.profile import constant_profile
 from gearsim_sim.stepper import Stepper
 from gearsim_sim.timeline import Timeline
 
@@ -126,10 +127,8 @@ class Ensemble:
         load_nm = timeline.checked_load(limits.load_nm if variant.load_nm is None else variant.load_nm)
         for spec in variant.faults:
             self._tables |= _check_fault(number, spec, plant, variant.seed)
-        step_rate_hz = self.sample_rate_hz * self._steps
-        schedule = first_schedule(
-            plant, timeline, self._steps, step_rate_hz, speed_hz, load_nm, variant.faults
-        )
+        course = constant_profile(plant, 1.0 / (self.sample_rate_hz * self._steps), speed_hz, load_nm)
+        schedule = first_schedule(plant, timeline, self._steps, course, variant.faults)
         sites = checked_sites(plant.sites if self._sites is None else self._sites, plant.system.dof_names)
         self.site_names = tuple(sites)
         return Lane(plant, timeline, schedule, Stepper(plant, schedule, sites, self._steps))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from bisect import insort
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from gearsim_sim.events import Clear, Event, Inject, SetOperatingPoint
@@ -19,10 +20,16 @@ class History:
     ----------
     scenario : Scenario
         Its operating point and faults hold from sample 0; its events must be added one by one.
+    course : callable, optional
+        Speed [Hz] and load [N m] at a sample, where they change without events; what holds is then told
+        anew every second.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self, scenario: Scenario, course: Callable[[int], tuple[float, float]] | None = None
+    ) -> None:
         self._scenario = scenario
+        self._course = course
         self._events: list[Event] = []
 
     @property
@@ -40,6 +47,9 @@ class History:
         for event in self._events:
             start = _sample(event)
             found.add(start + self._samples(event.ramp_s) if isinstance(event, Clear) else start)
+        if self._course is not None:
+            rate = self._scenario.sample_rate_hz
+            found |= {round(k * rate) for k in range(math.floor(after / rate), math.ceil(upto / rate) + 1)}
         return sorted(sample for sample in found if after < sample <= upto)
 
     def truth(self, sample: int, t0_ns: int) -> GroundTruth:
@@ -68,6 +78,8 @@ class History:
         _drop_ended(running, ends, sample)
         changes = self.changes(0, sample)
         holds_from = changes[-1] if changes else 0
+        if self._course is not None:
+            speed_hz, load_nm = self._course(holds_from)
         return GroundTruth(
             t0_ns=t0_ns + round(holds_from * 1e9 / scenario.sample_rate_hz),
             sample=holds_from,

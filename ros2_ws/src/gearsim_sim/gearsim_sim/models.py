@@ -45,6 +45,15 @@ class RunningModel(Protocol):
         """Schedule a fault; returns its sample."""
         ...
 
+    @property
+    def steady(self) -> bool:
+        """Whether speed and load change by events only."""
+        ...
+
+    def operating_point_at(self, sample: int) -> tuple[float, float]:
+        """Speed [Hz] and load [N m] at a sample that has been handed out."""
+        ...
+
     def clear(self, fault_id: str = "", ramp_s: float = 0.1, at_sample: int | None = None) -> int:
         """Schedule the end of a fault; returns its sample."""
         ...
@@ -78,8 +87,9 @@ def _engine(scenario: Scenario) -> RunningModel:
         scenario.sample_rate_hz,
         scenario.oversampling,
         scenario.faults,
-        speed_hz=scenario.speed_hz,
+        speed_hz=None if scenario.operation.profile.trace else scenario.speed_hz,
         load_nm=scenario.load_nm,
+        operation=scenario.operation,
     )
 
 

@@ -20,7 +20,10 @@ from gearsim_io.machines import load_machine, machine_file
 from gearsim_io.nameplate import Channel, Machine
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
+from gearsim_sim.model.structure import StructureModel
 from gearsim_sim.models import MODELS
+from gearsim_sim.operation import Operation
+from gearsim_sim.profile.settings import ProfileModel
 from gearsim_sim.sensors.rows import SensorTable
 from gearsim_sim.sensors.settings import SensorsModel
 from gearsim_sim.sensors.table import sensor_table
@@ -31,14 +34,17 @@ FOLDER = Path(__file__).parent / "scenarios"
 _MOST_BATCH_BYTES = 480_000
 
 Seconds = Annotated[float, Si("s", ge=0, le=1e6)]
-Speed = Annotated[float, Si("Hz", gt=0, le=500)]
+Speed = Annotated[float, Si("Hz", ge=0, le=500)]
 Load = Annotated[float, Si("N*m", ge=0, le=1e5)]
 
 
 class OperatingPointModel(Strict):
-    """Speed of the reference shaft and load torque at the start."""
+    """Speed of the reference shaft and load torque at the start.
 
-    speed: Speed
+    Under a law of torques it is what is to be reached; beside a measured trace there is no speed here.
+    """
+
+    speed: Speed | None = None
     load: Load
 
 
@@ -114,6 +120,8 @@ class ScenarioModel(Strict):
     batch_samples: Annotated[int, Field(ge=16, le=65536)] = 4096
     rate_factor: Annotated[float, Si("", ge=0, le=1000)] = 1.0
     operating_point: OperatingPointModel
+    profile: ProfileModel = ProfileModel()
+    structure: StructureModel = StructureModel()
     sensors: SensorsModel = SensorsModel()
     parameters: dict[str, Any] = Field(default_factory=dict)
     faults: tuple[FaultModel, ...] = ()
@@ -133,7 +141,9 @@ class Scenario:
     machine_path : Path
         Description of the machine, for the model's parameters.
     speed_hz, load_nm : float
-        Operating point at the start.
+        Operating point at the start; under a law of torques the speed to be reached.
+    operation : Operation
+        Operating profile and added structure.
     parameters : mapping
         Dotted names of model parameters and the values that replace those of the machine description.
     faults : tuple of FaultSpec
@@ -155,6 +165,7 @@ class Scenario:
     rate_factor: float
     speed_hz: float
     load_nm: float
+    operation: Operation
     sensors: SensorTable
     parameters: Mapping[str, Any]
     faults: tuple[FaultSpec, ...]
@@ -213,6 +224,7 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
     model = validate(ScenarioModel, content, where)
     if model.model not in MODELS:
         raise InputError(where, "model", model.model, "one of " + ", ".join(sorted(MODELS)))
+    operation = Operation(model.profile, model.structure, where, path.parent)
     machine_path = _machine_path(model.machine, path)
     machine = load_machine(machine_path)
     table = sensor_table(model.sensors, machine, where)
@@ -235,8 +247,9 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
         oversampling=model.oversampling,
         batch_samples=model.batch_samples,
         rate_factor=model.rate_factor,
-        speed_hz=model.operating_point.speed,
+        speed_hz=operation.first_speed_hz(model.operating_point.speed),
         load_nm=model.operating_point.load,
+        operation=operation,
         sensors=table,
         parameters=model.parameters,
         faults=faults,

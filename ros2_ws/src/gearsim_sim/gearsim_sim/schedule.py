@@ -13,78 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.integrate.pieces import DEGREE, plain_polynomial, plain_ramp
+from gearsim_sim.integrate.pieces import plain_ramp
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults import Fault
 from gearsim_sim.model.loop_data import COLUMNS, NEED_RATES, SEVERITY_COLUMNS, Drive
 from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.side_data import SIDE_TABLES, SideRow
+from gearsim_sim.profile.profile import Profile
 
 Array = NDArray[np.float64]
 REBASE_STEPS = 1 << 16
-
-
-@dataclass(frozen=True, eq=False)
-class Segment:
-    """A stretch in which angle and load are polynomials of u = (step - start_step) / length_steps."""
-
-    start_step: int
-    length_steps: float
-    turns: Array  # coefficients, ascending, of the reference shaft's turns since start_step
-    load: Array  # coefficients, ascending [N m]
-    step_s: float
-    end_speed_hz: float  # what the segment leads to
-    end_load_nm: float
-    end_step: int | None  # None: it holds for good
-
-    def _u(self, step: int) -> float:
-        return float(step - self.start_step) / self.length_steps
-
-    def turns_at(self, step: int) -> float:
-        """Turns since the start."""
-        return plain_polynomial(self._u(step), self.turns)[0]
-
-    def speed_hz(self, step: int) -> float:
-        """Speed of the reference shaft."""
-        return plain_polynomial(self._u(step), self.turns)[1] / (self.length_steps * self.step_s)
-
-    def acceleration_hz_per_s(self, step: int) -> float:
-        """Its change."""
-        return plain_polynomial(self._u(step), self.turns)[2] / (self.length_steps * self.step_s) ** 2
-
-    def load_nm(self, step: int) -> float:
-        """Load torque."""
-        return plain_polynomial(self._u(step), self.load)[0]
-
-
-def steady(step: int, step_s: float, speed_hz: float, load_nm: float) -> Segment:
-    """Constant speed and load from a step on."""
-    return Segment(
-        step, 1.0, _filled([0.0, speed_hz * step_s]), _filled([load_nm]), step_s, speed_hz, load_nm, None
-    )
-
-
-def ramp(now: Segment, step: int, speed_hz: float, load_nm: float, steps: int) -> Segment:
-    """From the speed, acceleration and load that `now` has at `step` to others, without a jump of torque.
-
-    The speed follows 10 u^3 - 15 u^4 + 6 u^5, and u - 6 u^3 + 8 u^4 - 3 u^5 where it was changing already.
-    """
-    seconds = steps * now.step_s
-    start, load = now.speed_hz(step), now.load_nm(step)
-    change, fading = speed_hz - start, now.acceleration_hz_per_s(step) * seconds
-    rise = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
-    speed = change * rise + fading * np.array([0.0, 1.0, 0.0, -6.0, 8.0, -3.0])
-    speed[0] = start
-    turns = np.concatenate([[0.0], speed / np.arange(1, 7)]) * seconds
-    torque = (load_nm - load) * rise
-    torque[0] = load
-    end = step + steps
-    return Segment(step, float(steps), _filled(turns), _filled(torque), now.step_s, speed_hz, load_nm, end)
-
-
-def _filled(coefficients: Sequence[float] | Array) -> Array:
-    result = np.zeros(DEGREE + 1)
-    result[: len(coefficients)] = coefficients
-    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +34,19 @@ class Severity:
     start_step: int
     steps: float
 
-    def value(self, step: int) -> float:
+    def value(self, step: float) -> float:
         """The severity at a step."""
         rise, _, _ = plain_ramp(float(step - self.start_step), self.steps)
         return self.start_value + (self.end_value - self.start_value) * rise
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is not zero throughout."""
+        return self.start_value != 0.0 or self.end_value != 0.0
+
+    def row(self) -> tuple[float, float, float, float]:
+        """The first columns of a row of a table."""
+        return (self.start_value, self.end_value, float(self.start_step), self.steps)
 
     def gone(self, step: int) -> bool:
         """Whether it has faded away for good."""
@@ -112,36 +59,58 @@ class ActiveFault:
 
     fault: Fault
     severity: Severity
+    serial: int = 0  # stays with it while its severity changes, and when it is renamed
 
 
 class Schedule:
-    """Mutable: the present segment of the operating point, the anchor of the angles, the faults."""
+    """Mutable: the profile and its present segment, the anchor of the angles, the faults."""
 
     def __init__(
-        self, plant: Plant, step_s: float, first_step: int, turns: float, speed_hz: float, load_nm: float
+        self,
+        plant: Plant,
+        profile: Profile,
+        first_step: int,
+        turns: float,
+        forces: Sequence[Contribution] = (),
     ) -> None:
-        """Start at `first_step` with the reference shaft at `turns` turns."""
+        """Start at `first_step` with the reference shaft at `turns` turns.
+
+        `forces` act from the start on, beside those of faults.
+        """
         self._rates = plant.rates
         self._faults_on = plant.faults_on
-        self.step_s = step_s
-        self.segment = steady(first_step, step_s, speed_hz, load_nm)
+        self._forces = tuple(forces)
+        self.step_s = profile.step_s
+        self.profiles = [(first_step, profile)]  # each from its step on
+        self.segment = profile.segment(first_step)
         self.anchor_step = first_step
         whole = plant.phases(turns)
         self.anchor_turns: NDArray[np.int64] = np.floor(whole).astype(np.int64)
         self.anchor_phases: Array = whole - np.floor(whole)
         self.reference_turns = turns
         self.faults: dict[str, ActiveFault] = {}
+        self._serial = 0
 
     @property
-    def change_step(self) -> int | None:
-        """Step at which the present segment ends, if it does."""
+    def profile(self) -> Profile:
+        """The present one."""
+        return self.profiles[-1][1]
+
+    @property
+    def change_step(self) -> int:
+        """Step at which the present segment ends."""
         return self.segment.end_step
 
-    def turns_since_anchor(self, step: int) -> float:
+    def operating_point(self, step: int) -> tuple[float, float]:
+        """Speed [Hz] and load [N m] at a step of the past or the present."""
+        profile = next((one for start, one in reversed(self.profiles) if start <= step), self.profiles[0][1])
+        return profile.speed_at(step), profile.load_at(step)
+
+    def turns_since_anchor(self, step: float) -> float:
         """Turns of the reference shaft from the anchor to a step."""
         return self.segment.turns_at(step) - self.segment.turns_at(self.anchor_step)
 
-    def turns(self, step: int) -> float:
+    def turns(self, step: float) -> float:
         """Turns of the reference shaft; loses digits in long runs, for display and statics only."""
         return self.reference_turns + self.turns_since_anchor(step)
 
@@ -154,21 +123,23 @@ class Schedule:
         self.anchor_turns = self.anchor_turns + whole.astype(np.int64)
         self.reference_turns += passed
         self.anchor_step = step
-        if self.segment.end_step is None:
-            self.segment = steady(step, self.step_s, self.segment.end_speed_hz, self.segment.end_load_nm)
+        if step >= self.segment.end_step:
+            self.segment = self.profile.segment(step)
         self.faults = {name: one for name, one in self.faults.items() if not one.severity.gone(step)}
 
     def go_on(self, step: int) -> None:
         """Leave a segment that ends at this step."""
         if self.segment.end_step == step:
             self.rebase(step)
-            self.segment = steady(step, self.step_s, self.segment.end_speed_hz, self.segment.end_load_nm)
 
-    def set_operating_point(self, step: int, speed_hz: float, load_nm: float, ramp_steps: int) -> None:
-        """Begin a ramp at this step, from the present speed, acceleration and load."""
-        following = ramp(self.segment, step, speed_hz, load_nm, ramp_steps)
+    def set_operating_point(
+        self, step: int, speed_hz: float | None, load_nm: float | None, ramp_steps: int
+    ) -> None:
+        """Begin a ramp at this step from what is found there; None lets speed or load go on as it does."""
+        following = self.profile.changed(step, speed_hz, load_nm, float(ramp_steps))
         self.rebase(step)
-        self.segment = following
+        self.profiles.append((step, following))
+        self.segment = following.segment(step)
 
     def grow(self, step: int, name: str, fault: Fault, ramp_steps: float) -> None:
         """Let a fault's severity go from what it is to that of `fault`.
@@ -182,14 +153,20 @@ class Schedule:
             self.faults[f"{name} until {end}"] = self.faults.pop(name)
             old = None
         now = 0.0 if old is None else old.severity.value(step)
-        self.faults[name] = ActiveFault(fault, Severity(now, fault.severity, step, ramp_steps))
+        serial = self.new_serial() if old is None else old.serial
+        self.faults[name] = ActiveFault(fault, Severity(now, fault.severity, step, ramp_steps), serial)
+
+    def new_serial(self) -> int:
+        """A number that no other fault of this run has."""
+        self._serial += 1
+        return self._serial
 
     def fade(self, step: int, name: str, ramp_steps: float) -> None:
         """Let a fault's severity go to zero."""
         if name in self.faults:
             self.grow(step, name, replace(self.faults[name].fault, severity=0.0), ramp_steps)
 
-    def contributions(self, step: int) -> tuple[tuple[Contribution, float], ...]:
+    def contributions(self, step: float) -> tuple[tuple[Contribution, float], ...]:
         """What the faults contribute at a step, with severities, as the readable model takes it."""
         return tuple(
             (one, active.severity.value(step))
@@ -204,9 +181,10 @@ class Schedule:
         return Drive(
             turns=segment.turns,
             load=segment.load,
+            fluctuation=segment.fluctuation,
             start_step=segment.start_step,
             length_steps=segment.length_steps,
-            steady=int(segment.end_step is None),
+            steady=int(segment.steady),
             anchor_step=self.anchor_step,
             anchor_phases=self.anchor_phases,
             rates=self._rates,
@@ -215,6 +193,16 @@ class Schedule:
             **tables,
         )
 
+    def side_rows(self) -> tuple[SideRow, ...]:
+        """Forces beside the machine's own elements: those of the run, and those of faults."""
+        rows = [SideRow((0, i), one, (1.0, 1.0, 0.0, 0.0)) for i, one in enumerate(self._forces)]
+        for active in self.faults.values() if self._faults_on else ():
+            ramp = active.severity.row()
+            for i, one in enumerate(active.fault.contributions):
+                if one.table in SIDE_TABLES and active.severity.acts:
+                    rows.append(SideRow((active.serial, i), one, ramp))
+        return tuple(rows)
+
 
 def fault_tables(faults: Sequence[ActiveFault]) -> tuple[dict[str, Array], Array]:
     """The tables of rows of `Drive`, and the samples that they refer to."""
@@ -222,10 +210,12 @@ def fault_tables(faults: Sequence[ActiveFault]) -> tuple[dict[str, Array], Array
     samples: list[Array] = []
     at = 0
     for active in faults:
-        severity = active.severity
-        ramped = [severity.start_value, severity.end_value, severity.start_step, severity.steps]
+        if not active.severity.acts:
+            continue
         for one in active.fault.contributions:
-            row = [*ramped, *one.numbers()]
+            if one.table in SIDE_TABLES:
+                continue
+            row = [*active.severity.row(), *one.numbers()]
             table = one.samples()
             if table is not None:
                 row += [at, table.size // 2 - 1]

@@ -52,7 +52,7 @@ class Simulation:
         self.t0_ns = t0_ns
         self._factor = scenario.sensors.sampling.oversampling
         self._model = model or _told(scenario, lambda: _model(scenario))
-        self._history = History(scenario)
+        self._history = History(scenario, None if self._model.steady else self._model.operating_point_at)
         for number, event in enumerate(scenario.events):
             try:
                 self._schedule(event)

@@ -20,6 +20,8 @@ from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop, make_work
 from gearsim_sim.model.loop_data import Data, Part
 from gearsim_sim.model.plant import Moment, Plant, RotatingSite, StateRow
 from gearsim_sim.model.plant_data import bearing_data, bearing_memory, mesh_data
+from gearsim_sim.model.side_data import SidePart
+from gearsim_sim.model.side_state import SideState
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.schedule import Schedule
 
@@ -36,6 +38,7 @@ class PartSetup:
     part: Part
     interfaces: NDArray[np.int64]  # indices of its interfaces in the whole system
     state_rows: NDArray[np.int64]  # indices of the state rows that it gives
+    sites: Array  # (sites, own degrees of freedom) combinations that are put out
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +106,15 @@ class Stepper:
         self._data = _loop_data(plant, parts, self._place, rotations, schedule.step_s, oversampling)
         shape = self._data.bearings.cosines.shape
         sizes = [size for part in parts for size in (part.part.length // 2, part.interfaces.size)]
-        self._loops = [make_loop(*sizes, shape[1], with_rates) for with_rates in (False, True)]
+        # Without rates of the interfaces, with them, and with forces beside the machine's own elements too.
+        kinds = ((False, False), (True, False), (True, True))
+        self._loops = [make_loop(*sizes, shape[1], rates, side) for rates, side in kinds]
+        self._side = SideState(plant, [_side_part(part) for part in parts], len(vectors), schedule.step_s)
         self._memory = bearing_memory(self._data.bearings)
         self.row_count = len(vectors)
         self._state = self._at_rest()
+        phases, speed_hz = plant.phases(schedule.turns(self.step)), schedule.segment.speed_hz(self.step)
+        self._side.start(schedule.side_rows(), self._state, phases, self.step, speed_hz)
 
     @property
     def parts(self) -> tuple[PartSetup, ...]:
@@ -149,10 +157,13 @@ class Stepper:
         width = MOTION_COLUMNS + len(self._rows) + self._place.size
         motion = np.empty((count // self.oversampling + 1, width))
         s0, s1 = self._state
-        drive = self._schedule.drive()
+        schedule = self._schedule
+        drive = schedule.drive()
         work = make_work(self._data, drive, self._place.size)
-        samples = self._loops[drive.need_rates](
-            s0, s1, self._data, drive, self._memory, work, self.step, count, accel, column, motion
+        fluctuates = schedule.profile.fluctuation_nm is not None
+        side = self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
+        samples = self._loops[2 if side.active else drive.need_rates](
+            s0, s1, self._data, drive, side, self._memory, work, self.step, count, accel, column, motion
         )
         self.step += count
         return self._unpack(motion[:samples].T)
@@ -265,6 +276,7 @@ def set_up_part(
             [system.interface_names.index(name) for name in part.interface_names], dtype=np.int64
         ),
         state_rows=np.array(mine, dtype=np.int64),
+        sites=own[felt],
     )
 
 
@@ -280,7 +292,20 @@ def _nothing(system: LinearSystem) -> PartSetup:
         site_index=empty,
         state_rows=np.zeros((0, 0)),
     )
-    return PartSetup(names=(), dofs=empty, propagator=None, part=part, interfaces=empty, state_rows=empty)
+    return PartSetup(
+        names=(),
+        dofs=empty,
+        propagator=None,
+        part=part,
+        interfaces=empty,
+        state_rows=empty,
+        sites=np.zeros((0, 0)),
+    )
+
+
+def _side_part(setup: PartSetup) -> SidePart:
+    """A part as forces beside the machine's own elements need it."""
+    return SidePart(setup.names, setup.propagator, setup.interfaces.size, setup.part.site_index, setup.sites)
 
 
 def _loop_data(

@@ -97,11 +97,10 @@ class Timeline:
         load = None if event.load_nm is None else self.checked_load(event.load_nm)
 
         def action(schedule: Schedule, step: int) -> None:
-            new_speed = schedule.segment.end_speed_hz if speed is None else speed
-            new_load = schedule.segment.end_load_nm if load is None else load
-            shortest = self._shortest_ramp_s(new_speed - schedule.segment.speed_hz(step))
-            steps = self._ramp_steps(max(event.ramp_s, shortest))
-            schedule.set_operating_point(step, new_speed, new_load, steps)
+            shortest = (
+                0.0 if speed is None else self._shortest_ramp_s(speed - schedule.segment.speed_hz(step))
+            )
+            schedule.set_operating_point(step, speed, load, self._ramp_steps(max(event.ramp_s, shortest)))
 
         return action
 

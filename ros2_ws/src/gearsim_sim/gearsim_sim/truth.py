@@ -42,7 +42,8 @@ class GroundTruth:
     scenario, seed, version
         What produced the stream; `version` is the commit if it runs from a checkout.
     speed_hz, load_nm : float
-        Commanded operating point (the target, where it is ramped to).
+        Commanded operating point (the target, where it is ramped to); under a profile that varies by
+        itself, what it is at `sample`.
     faults : tuple of FaultTruth
         A fault counts from the start of its growth to the end of its ramp down.
     events : tuple of Event

@@ -23,11 +23,16 @@ def reference_motion(
 
 @inlined
 def known_inputs(step: int, change_hz_per_s: float, drive: Drive, data: Data, inputs: Array) -> None:
-    """Torques of motor and load and the weight, into `inputs`; the motor accelerates all inertia."""
-    load, _, _ = polynomial(float(step - drive.start_step) / drive.length_steps, drive.load)
+    """Torques of motor and load and the weight, into `inputs`.
+
+    The motor balances the load without its fluctuation and accelerates all inertia.
+    """
+    u = float(step - drive.start_step) / drive.length_steps
+    load, _, _ = polynomial(u, drive.load)
+    fluctuation, _, _ = polynomial(u, drive.fluctuation)
     accelerating = data.inertia * 2.0 * math.pi * change_hz_per_s
     inputs[0] = (accelerating - data.torque_ratios[1] * load) / data.torque_ratios[0]
-    inputs[1] = load
+    inputs[1] = load + fluctuation
     inputs[2] = data.gravity
 
 

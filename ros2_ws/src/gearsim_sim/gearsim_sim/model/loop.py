@@ -19,8 +19,11 @@ from gearsim_sim.integrate.pieces import cosine_sine
 from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, NOW_COLUMNS, rest_terms
 from gearsim_sim.model.bearing_loop import bearing_forces
 from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_motion
+from gearsim_sim.model.joint_loop import guess_forces, joint_forces
+from gearsim_sim.model.known_loop import ANGLE, SPEED, known_forces
 from gearsim_sim.model.loop_data import Array, BearingMemory, Data, Drive, Part
 from gearsim_sim.model.mesh_loop import WORK_COLUMNS, mesh_forces
+from gearsim_sim.model.side_data import Side
 
 # Columns of `motion` before the state rows of both parts: turns since the anchor, speed.
 MOTION_COLUMNS = 2
@@ -92,19 +95,22 @@ def make_loop(
     second_interfaces: int,
     balls: int,
     with_rates: bool,
+    with_side: bool = False,
 ) -> Callable[..., int]:
     """The compiled loop for parts of these (padded) numbers of modes and interfaces, and of balls.
 
-    The numbers of the second part may be 0. Rates of the interfaces cost time and are zero unless asked for.
+    The numbers of the second part may be 0. Rates of the interfaces cost time and are zero unless asked for;
+    forces beside the machine's own elements (`Side`) are not looked at unless asked for.
     """
     n0, n1 = first_modes, second_modes
     i0, i1 = first_interfaces, second_interfaces
     rated = 1 if with_rates else 0
+    sided = 1 if with_side else 0
     q0_count, q1_count = (1 + rated) * i0, (1 + rated) * i1
 
     def run(
-        s0: Array, s1: Array, data: Data, drive: Drive, memory: BearingMemory, work: Work,
-        first: int, count: int,
+        s0: Array, s1: Array, data: Data, drive: Drive, side: Side, memory: BearingMemory,
+        work: Work, first: int, count: int,
         accel: Array, column: int, motion: Array,
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
@@ -126,11 +132,17 @@ def make_loop(
             step = first + i + 1
             turns, speed, change = reference_motion(step, drive, per_step, per_second)
             passed = turns - anchor
+            for _ in range(sided):
+                passed += side.drift[ANGLE]
+                speed += side.drift[SPEED]
             move_phases(drive, passed, phases)
             if step <= changing:
                 known_inputs(step, change, drive, data, inputs)
                 apply_known(inputs, data.first, s0, known0, n0)
                 apply_known(inputs, data.second, s1, known1, n1)
+            for _ in range(sided):
+                fresh = step <= changing
+                known_forces(step, fresh, speed, change, phases, drive, data, side, s0, s1, 2 * n0, 2 * n1)
             predict(s0, data.first.k, n0)
             predict(s1, data.second.k, n1)
             q0 = interface_motion(s0, data.first.k, data.first.length, n0, i0, q0_count)
@@ -143,6 +155,8 @@ def make_loop(
                 rates[j] = s0[q0 + i0 + j]
             for j in range(rated * i1):
                 rates[i0 + j] = s1[q1 + i1 + j]
+            for _ in range(sided):
+                guess_forces(side, q, rates)
             bearing_forces(
                 step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
                 data.step_s, balls,
@@ -159,6 +173,8 @@ def make_loop(
                 s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
                 n1, i1,
             )  # fmt: skip
+            for _ in range(sided):
+                joint_forces(step, side, forces, s0, s1, 2 * n0, 2 * n1, accel, column + i)
             rotate_sites(phases, data, accel, column + i)
             if step % data.oversampling == 0:
                 row = motion[samples]

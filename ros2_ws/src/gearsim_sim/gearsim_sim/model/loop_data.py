@@ -95,6 +95,7 @@ class Drive(NamedTuple):
 
     turns: Array  # DEGREE + 1 coefficients, ascending: turns of the reference shaft since start_step
     load: Array  # DEGREE + 1 coefficients, ascending: load torque [N m]
+    fluctuation: Array  # the same of what the load has beyond that and the motor does not balance
     start_step: int
     length_steps: float
     steady: int  # 1: speed and load are constant, so that the known inputs are

@@ -20,6 +20,7 @@ from gearsim_sim.model.gear_errors import gear_error
 from gearsim_sim.model.gear_mesh import Mesh, MeshError, add_mesh, mesh_direction
 from gearsim_sim.model.gear_wheel import GearWheel
 from gearsim_sim.model.mesh_stiffness import StiffnessCurve, stiffness_curve
+from gearsim_sim.model.parallel_places import parallel_mounts, parallel_shafts
 from gearsim_sim.model.pedestal import add_pedestal
 from gearsim_sim.model.plant import BASE_INPUTS, Limits, Plant, StateRow, Track
 from gearsim_sim.model.ring import Ring
@@ -75,6 +76,8 @@ def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
             f"{shafts[1]}_torque": _coupling(model.flywheel_2, "theta_s4", "theta_f2"),
         },
         faults_on=physics.faults,
+        shafts=parallel_shafts(params, SENSE),
+        mounts=parallel_mounts(params),
     )
 
 

@@ -20,6 +20,7 @@ from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.gear_mesh import Mesh
 from gearsim_sim.model.gear_wheel import GearWheel
+from gearsim_sim.model.shafts import Mount, Shaft
 
 Array = NDArray[np.float64]
 # The known inputs that every plant has first, in this order.
@@ -101,6 +102,8 @@ class Plant:
         Places of accelerometers.
     signals : mapping
         Further outputs that are the state itself, such as torques.
+    shafts, mounts
+        What faults of shafts and structure act on; a mount by the name of its bearing.
     wheels : tuple of GearWheel
         Gear wheels whose teeth are known, each in each of its meshes.
     """
@@ -117,6 +120,8 @@ class Plant:
     limits: Limits
     gravity_m_per_s2: float
     signals: Mapping[str, StateRow] = field(default_factory=dict)
+    shafts: tuple[Shaft, ...] = ()
+    mounts: Mapping[str, Mount] = field(default_factory=dict)
     wheels: tuple[GearWheel, ...] = ()
     faults_on: bool = True
 

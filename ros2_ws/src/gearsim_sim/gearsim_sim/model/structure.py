@@ -10,14 +10,55 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from gearsim_io.quantities import Si, Strict
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.side_oscillator import SideOscillator
 
 Array = NDArray[np.float64]
+
+
+class AddedMass(Strict):
+    """A mass that swings: its frequency where its ends are held, and its damping."""
+
+    mass_kg: Annotated[float, Si("kg", gt=0, le=1000), Field(alias="mass")]
+    frequency_hz: Annotated[float, Si("Hz", gt=0, le=20000), Field(alias="frequency")]
+    damping_ratio: Annotated[float, Si("", ge=0, lt=1)]
+
+
+class ResonanceModel(AddedMass):
+    """A mass on a measuring site."""
+
+    site: str
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Where it hangs."""
+        return (self.site,)
+
+
+class PathModel(AddedMass):
+    """A mass between two measuring sites; below its frequency a spring of m w^2 / 4."""
+
+    from_site: Annotated[str, Field(alias="from")]
+    to: str
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Where it hangs."""
+        return (self.from_site, self.to)
+
+
+class StructureModel(Strict):
+    """What the structure has beside the model's masses."""
+
+    resonances: tuple[ResonanceModel, ...] = ()
+    paths: tuple[PathModel, ...] = ()
 
 
 def with_oscillators(system: LinearSystem, added: Mapping[str, SideOscillator]) -> LinearSystem:
@@ -44,14 +85,6 @@ def with_oscillators(system: LinearSystem, added: Mapping[str, SideOscillator]) 
         interfaces=np.vstack([system.interfaces, np.zeros((count, system.interfaces.shape[1]))]),
         inputs=np.vstack([system.inputs, np.zeros((count, system.inputs.shape[1]))]),
     )
-
-
-def weighted(system: LinearSystem, gravity_input: int, weights: Mapping[str, float]) -> LinearSystem:
-    """The system with the weight of further masses, per unit of gravity: degree of freedom to -mass."""
-    inputs = system.inputs.copy()
-    for name, value in weights.items():
-        inputs[system.dof(name), gravity_input] += value
-    return replace(system, inputs=inputs)
 
 
 def joined_parts(

@@ -12,7 +12,7 @@ import numpy as np
 from gearsim_io.errors import InputError
 from gearsim_sim.profile.curve import Constant, Curve, Laid, Stretch, ramp_stretch, stretches_between
 from gearsim_sim.profile.dynamics import LawLoad, Rotor, TorqueSpeed, settles_at
-from gearsim_sim.profile.laws import ConstantMotor, ControlledMotor, CurveMotor, LoadShape, Motor
+from gearsim_sim.profile.laws import CREEP, ConstantMotor, ControlledMotor, CurveMotor, LoadShape, Motor
 from gearsim_sim.profile.noise import WIDEST_BAND, RandomLoad
 from gearsim_sim.profile.profile import Profile
 from gearsim_sim.profile.settings import LoadLawModel, LoadNoiseModel, ProfileModel, TorquesModel, TraceModel
@@ -89,22 +89,36 @@ def _prescribed(wanted: Wanted, drive: DriveLimits) -> tuple[Curve, Curve]:
 
 
 def _of_trace(wanted: Wanted, given: TraceModel, drive: DriveLimits) -> tuple[Curve, Curve]:
-    path = Path(given.file) if Path(given.file).is_absolute() else wanted.folder / given.file
-    names = (given.time, given.speed) if given.load is None else (given.time, given.speed, given.load)
-    columns = read_columns(path, names)
-    unit = _RPM if given.speed_unit == "rpm" else 1.0
-    trace = Trace(str(path), columns[given.time], columns[given.speed] * unit)
-    speed = trace_curve(trace.checked(given.speed, given.max_gap), drive.step_s, given.tolerance, given.speed)
+    trace, loads = read_trace(given, wanted.folder)
+    speed = trace_curve(trace, drive.step_s, given.tolerance, given.speed)
     _check_trace(trace.where, given.speed, speed, drive)
-    if given.load is None:
+    if given.load is None or loads is None:
         return speed, Constant(wanted.load_nm)
-    trace = Trace(str(path), columns[given.time], columns[given.load])
-    trace.checked(given.load, given.max_gap)
-    load = trace_curve(trace, drive.step_s, given.load_tolerance, given.load)
+    load = trace_curve(loads, drive.step_s, given.load_tolerance, given.load)
     greatest = max((one.extremes()[1] for one in load.stretches), default=load.final_value())
     if greatest > drive.load_nm:
         raise InputError(trace.where, given.load, f"up to {greatest:.4g} N m", f"0 to {drive.load_nm:g} N m")
     return speed, load
+
+
+def read_trace(given: TraceModel, folder: Path) -> tuple[Trace, Trace | None]:
+    """Speed [Hz] and, if there is one, load [N m] of a measured trace; paths start at `folder`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or followed.
+    """
+    path = Path(given.file) if Path(given.file).is_absolute() else folder / given.file
+    names = (given.time, given.speed) if given.load is None else (given.time, given.speed, given.load)
+    columns = read_columns(path, names)
+    unit = _RPM if given.speed_unit == "rpm" else 1.0
+    speed = Trace(str(path), columns[given.time], columns[given.speed] * unit)
+    speed.checked(given.speed, given.max_gap)
+    if given.load is None:
+        return speed, None
+    load = Trace(str(path), columns[given.time], columns[given.load])
+    return speed, load.checked(given.load, given.max_gap)
 
 
 def _check_trace(where: str, field: str, speed: Laid, drive: DriveLimits) -> None:
@@ -154,9 +168,7 @@ def _of_torques(wanted: Wanted, given: TorquesModel, drive: DriveLimits) -> Prof
         _refuse(wanted, "operating_point.load", wanted.load_nm, f"0 to {drive.load_nm:g} N m")
     steps = given.takeover / drive.step_s
     takeover = Laid([ramp_stretch(0.0, steps, 0.0, 1.0)], 0.0, 1.0)
-    rated: Curve = Constant(wanted.load_nm)
-    if given.start_speed == 0:  # a passive load cannot pull before the motor does
-        rated = Laid([ramp_stretch(0.0, steps, 0.0, wanted.load_nm)], 0.0, wanted.load_nm)
+    rated = Constant(wanted.load_nm)
     shape = _shape(wanted.section.load_law, asked)
     motor, inner = _motor(given, asked, wanted.load_nm * drive.ratio * shape(given.start_speed), drive)
     rotor = Rotor(motor, shape, rated, takeover, drive.inertia_kg_m2, drive.ratio, drive.step_s)
@@ -187,11 +199,12 @@ def _check_reach(wanted: Wanted, rotor: Rotor, given: TorquesModel, asked: float
     """The motor must reach the speed that is asked for, and must not run away."""
     start = given.start_speed
     field = "profile.torques.motor"
-    if start == 0 and rotor.surplus_nm(0.0, wanted.load_nm) <= 0:
-        needs = drive.ratio * wanted.load_nm * rotor.shape(0.0)
-        found = f"{rotor.motor.strongest_nm(0.0):.4g} N m at rest"
-        _refuse(wanted, field, found, f"more than the load at rest, {needs:.4g} N m: it does not start")
     end = settles_at(rotor, start, wanted.load_nm, drive.speed_hz)
+    crawl = 5 * CREEP * asked
+    if end < crawl:
+        needs = drive.ratio * wanted.load_nm * rotor.shape(crawl)
+        found = f"{rotor.motor.strongest_nm(0.0):.4g} N m at rest"
+        _refuse(wanted, field, found, f"more than the load there, {needs:.4g} N m: it does not start")
     if end < _REACHED * asked:
         expected = f"one that reaches the operating point's {asked:g} Hz under {wanted.load_nm:g} N m"
         _refuse(wanted, field, f"a motor that settles at {end:.4g} Hz", expected)

@@ -3,8 +3,7 @@
     2 pi J dv/dt = takeover(t) (T_motor(t, v, inner) - ratio load(t) shape(v))
 
 J is the inertia of everything that turns, at the reference shaft; v its speed in Hz. `takeover` rises
-smoothly from 0 to 1 at the start: a torque that jumps is a blow that no rig gives. The load is passive, so
-it rises with the motor's torque where a run starts from rest.
+smoothly from 0 to 1 at the start: a torque that jumps is a blow that no rig gives.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from gearsim_sim.profile.curve import (
     ramp_from,
     ramp_stretch,
 )
-from gearsim_sim.profile.laws import LoadShape, Motor
+from gearsim_sim.profile.laws import ControlledMotor, LoadShape, Motor
 
 BLOCK_S = 1.0  # solved in one go
 _RTOL, _ATOL_HZ = 1e-11, 1e-12
@@ -149,7 +148,14 @@ class TorqueSpeed:
         return float(self._state[0])
 
     def final_value(self) -> float:
-        """Where the speed comes to rest: solved up to there."""
+        """Where the speed comes to rest."""
+        motor = self.rotor.motor
+        if isinstance(motor, ControlledMotor):
+            return motor.target_hz.final_value()
+        return settles_at(self.rotor, self._first, self.rotor.rated_nm.final_value(), 10.0 * self._scale)
+
+    def at_rest(self) -> float:
+        """The same, solved up to there."""
         while not self._still:
             self._solve_block()
         return self._last

@@ -18,13 +18,15 @@ from scipy.interpolate import PchipInterpolator
 from gearsim_sim.profile.curve import Curve
 
 Array = NDArray[np.float64]
+CREEP = 0.005  # speed below which a constant load is not yet there, over the rated speed
 
 
 @dataclass(frozen=True, slots=True)
 class LoadShape:
     """Load torque over its rated value: constant + linear (v / v_rated) + quadratic (v / v_rated)^2.
 
-    The shares sum to one, so that the load is the rated one at `rated_speed_hz`.
+    The shares sum to one, so that the load is the rated one at `rated_speed_hz`. A load does not pull back a
+    machine that stands: its constant share comes on as tanh(v / creep), within a crawl of the rated speed.
     """
 
     constant: float
@@ -35,7 +37,7 @@ class LoadShape:
     def __call__(self, speed_hz: float) -> float:
         """The factor at a speed."""
         x = speed_hz / self.rated_speed_hz
-        return self.constant + x * (self.linear + x * self.quadratic)
+        return self.constant * math.tanh(x / CREEP) + x * (self.linear + x * self.quadratic)
 
 
 class Motor(Protocol):

@@ -16,47 +16,56 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearsim_sim.profile.curve import GRID_STEPS, Array, Constant, Curve, Laid, ramp_from
+from gearsim_sim.integrate.pieces import DEGREE, plain_polynomial
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.profile.curve import GRID_STEPS, Array, Constant, Curve, ramp_from
+from gearsim_sim.profile.dynamics import LawLoad, TorqueSpeed
 
-SPEED_SIZE, TURNS_SIZE, TORQUE_SIZE = 7, 8, 6
+SPEED_SIZE, TORQUE_SIZE = 7, 6
+SIZE = DEGREE + 1  # of the polynomials that the loop takes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """Polynomials in u = (step - start_step) / (end_step - start_step), lowest power first."""
+    """Polynomials of u = (step - start_step) / length_steps, coefficients ascending, (SIZE,) each."""
 
     start_step: int
     end_step: int
-    turns: Array  # (8,) turns of the reference shaft since start_step
-    load_nm: Array  # (6,) without the fluctuation
-    motor_nm: Array  # (6,)
-    fluctuation_nm: Array  # (6,) of the load, beyond `load_nm`
+    turns: Array  # of the reference shaft since start_step
+    load: Array  # [N m] without its fluctuation
+    motor: Array  # [N m]
+    fluctuation: Array  # [N m] of the load
     step_s: float
 
     @property
-    def steps(self) -> int:
-        """Length."""
-        return self.end_step - self.start_step
+    def length_steps(self) -> float:
+        """Steps from its start to its end."""
+        return float(self.end_step - self.start_step)
 
     @property
     def steady(self) -> bool:
         """Whether speed and torques are constant."""
-        torques = (self.load_nm, self.motor_nm, self.fluctuation_nm)
+        torques = (self.load, self.motor, self.fluctuation)
         return not (np.any(self.turns[2:]) or any(np.any(one[1:]) for one in torques))
+
+    def _at(self, step: float, coefficients: Array) -> tuple[float, float, float]:
+        return plain_polynomial((step - self.start_step) / self.length_steps, coefficients)
 
     def turns_at(self, step: float) -> float:
         """Turns since the start of the segment."""
-        return _horner(self.turns, (step - self.start_step) / self.steps)
+        return self._at(step, self.turns)[0]
 
-    def speed_hz_at(self, step: float) -> float:
+    def speed_hz(self, step: float) -> float:
         """Speed of the reference shaft."""
-        u = (step - self.start_step) / self.steps
-        return _horner(_derivative(self.turns), u) / (self.steps * self.step_s)
+        return self._at(step, self.turns)[1] / (self.length_steps * self.step_s)
 
-    def acceleration_hz_per_s_at(self, step: float) -> float:
+    def acceleration_hz_per_s(self, step: float) -> float:
         """Its change per second."""
-        u = (step - self.start_step) / self.steps
-        return _horner(_derivative(_derivative(self.turns)), u) / (self.steps * self.step_s) ** 2
+        return self._at(step, self.turns)[2] / (self.length_steps * self.step_s) ** 2
+
+    def load_nm(self, step: float) -> float:
+        """Load torque without its fluctuation."""
+        return self._at(step, self.load)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,15 +105,18 @@ class Profile:
             begins.append(noise.start)
         start, end = math.ceil(max(begins)), math.ceil(min(ends))
         length = float(end - start)
-        turns = np.zeros(TURNS_SIZE)
         seconds = length * self.step_s
-        speed_part = speed.cut(start, length, SPEED_SIZE)
-        turns[1:] = speed_part * seconds / np.arange(1, TURNS_SIZE)
-        load_part = load.cut(start, length, TORQUE_SIZE)
-        acceleration = _derivative(speed_part) / seconds
-        motor = self.ratio * load_part + 2 * math.pi * self.inertia_kg_m2 * acceleration
-        fluctuation = np.zeros(TORQUE_SIZE) if noise is None else noise.cut(start, length, TORQUE_SIZE)
-        return Segment(start, end, turns, load_part, motor, fluctuation, self.step_s)
+        turns = np.zeros(SIZE)
+        own = speed.cut(start, length, SPEED_SIZE)
+        turns[1:] = own * seconds / np.arange(1, SIZE)
+        torques = np.zeros((3, SIZE))  # load, motor, fluctuation
+        torques[0, :TORQUE_SIZE] = load.cut(start, length, TORQUE_SIZE)
+        accelerating = 2 * math.pi * self.inertia_kg_m2 / seconds * own[1:] * np.arange(1, SPEED_SIZE)
+        torques[1] = self.ratio * torques[0]
+        torques[1, :TORQUE_SIZE] += accelerating
+        if noise is not None:
+            torques[2, :TORQUE_SIZE] = noise.cut(start, length, TORQUE_SIZE)
+        return Segment(start, end, turns, torques[0], torques[1], torques[2], self.step_s)
 
     def speed_at(self, step: int) -> float:
         """Speed of the reference shaft [Hz]."""
@@ -117,36 +129,42 @@ class Profile:
     def changed(self, step: int, speed_hz: float | None, load_nm: float | None, ramp_steps: float) -> Profile:
         """Another operating point from a step on, over a smooth ramp; None lets a curve go on as it is.
 
-        A load that depends on the speed takes `load_nm` by its own rule (`with_load`).
+        A load that depends on the speed goes on doing so, `load_nm` being its rated value; under a law of
+        torques the speed answers to it. A new speed ends such a law.
         """
         speed, load = self.speed_hz, self.load_nm
         if speed_hz is not None:
             speed = ramp_from(speed, step, speed_hz, ramp_steps)
-        if load_nm is not None:
+        elif load_nm is not None and isinstance(speed, TorqueSpeed):
+            speed = speed.with_rated(step, ramp_from(speed.rotor.rated_nm, step, load_nm, ramp_steps))
+        if isinstance(load, LawLoad):
+            load = load.changed(step, speed, load_nm, ramp_steps)
+        elif load_nm is not None:
             load = ramp_from(load, step, load_nm, ramp_steps)
         return replace(self, speed_hz=speed, load_nm=load)
 
+    def turns_between(self, first: int, last: int) -> float:
+        """Turns of the reference shaft from a step to a later one."""
+        total, step = 0.0, first
+        while step < last:
+            segment = self.segment(step)
+            end = min(segment.end_step, last)
+            total += segment.turns_at(end) - segment.turns_at(step)
+            step = end
+        return total
 
-def constant_profile(
-    speed_hz: float, load_nm: float, *, step_s: float, ratio: float, inertia_kg_m2: float
-) -> Profile:
-    """One operating point."""
-    return Profile(Constant(speed_hz), Constant(load_nm), step_s, ratio, inertia_kg_m2)
-
-
-def is_constant(curve: Curve, step: int) -> bool:
-    """Whether a curve will not change any more from a step on, as far as its kind tells."""
-    if isinstance(curve, Laid):
-        return not curve.stretches or step >= curve.stretches[-1].end
-    return isinstance(curve, Constant)
-
-
-def _horner(coefficients: Array, u: float) -> float:
-    result = 0.0
-    for c in coefficients[::-1]:
-        result = result * u + float(c)
-    return result
+    @property
+    def constant(self) -> bool:
+        """Whether speed and load stay as they are until an event."""
+        return isinstance(self.speed_hz, Constant) and isinstance(self.load_nm, Constant)
 
 
-def _derivative(coefficients: Array) -> Array:
-    return coefficients[1:] * np.arange(1, coefficients.size)
+def constant_profile(plant: Plant, step_s: float, speed_hz: float, load_nm: float) -> Profile:
+    """One operating point of a machine."""
+    return Profile(Constant(speed_hz), Constant(load_nm), step_s, load_ratio(plant), plant.inertia_kg_m2)
+
+
+def load_ratio(plant: Plant) -> float:
+    """Turns of the loaded shaft per turn of the reference shaft, in the senses of the torques."""
+    motor, load = plant.torque_ratios
+    return -load / motor

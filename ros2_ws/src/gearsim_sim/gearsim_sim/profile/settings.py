@@ -88,7 +88,7 @@ class RippleModel(Strict):
 
     at: Literal["motor", "load"]
     order: Annotated[float, Si("", gt=0, le=1000)] | None = None
-    frequency: Annotated[float, Si("Hz", gt=0)] | None = None
+    frequency: Annotated[float, Si("Hz", ge=1)] | None = None
     amplitude: Torque
     phase: Annotated[float, Si("rad")] = 0.0
 

@@ -11,6 +11,7 @@ from gearsim_sim.model.faults import (
     gear_tooth_spall,
     gear_wear,
     inner_race_spall,
+    of_shafts,
     outer_race_spall,
     planet_position_error,
     planet_tooth_crack,
@@ -36,6 +37,7 @@ _KINDS = (
     profile_modification.KIND,
     gear_backlash.KIND,
     gear_misalignment.KIND,
+    *of_shafts.KINDS,
 )
 REGISTRY: dict[str, FaultKind] = {kind.name: kind for kind in _KINDS}
 

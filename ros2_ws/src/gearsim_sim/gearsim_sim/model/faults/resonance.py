@@ -1,0 +1,35 @@
+"""An added resonance at a measuring site: a mass on a spring (`SideOscillator` on one place)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from gearsim_sim.model.contributions import Contribution
+from gearsim_sim.model.faults.kind import FaultKind
+from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.side_oscillator import SideOscillator
+from gearsim_sim.params.fields import SiKeyed, Strict
+
+
+class ResonanceParams(Strict):
+    """The mass that swings, its frequency on a held base, and its damping."""
+
+    mass_kg: Annotated[float, SiKeyed("kg", gt=0, le=1000)] = 0.5
+    frequency_hz: Annotated[float, SiKeyed("Hz", gt=0, le=20000)] = 3000.0
+    damping_ratio: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.02
+
+
+def place(params: ResonanceParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
+    """The oscillator."""
+    where = (site_vector(plant, component),)
+    return (SideOscillator(where, params.mass_kg, params.frequency_hz, params.damping_ratio),)
+
+
+KIND = FaultKind(
+    name="resonance",
+    summary="a part of the structure that swings at a measuring site",
+    params_model=ResonanceParams,
+    components=fixed_sites,
+    place=place,
+)

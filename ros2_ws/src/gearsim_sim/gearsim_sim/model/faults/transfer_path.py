@@ -1,0 +1,46 @@
+"""An added transfer path: a mass on springs between two measuring sites (`SideOscillator` on two places)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from gearsim_io.errors import InputError
+from gearsim_sim.model.contributions import Contribution
+from gearsim_sim.model.faults.kind import FaultKind
+from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.plant import Plant
+from gearsim_sim.model.side_oscillator import SideOscillator
+from gearsim_sim.params.fields import SiKeyed, Strict
+
+
+class TransferPathParams(Strict):
+    """Below its frequency the path is a spring of m w^2 / 4.
+
+    `to` is the site at the other end; without it the next one in the same direction.
+    """
+
+    to: str | None = None
+    mass_kg: Annotated[float, SiKeyed("kg", gt=0, le=1000)] = 0.5
+    frequency_hz: Annotated[float, SiKeyed("Hz", gt=0, le=20000)] = 1000.0
+    damping_ratio: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.05
+
+
+def place(params: TransferPathParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
+    """The path."""
+    others = [name for name in fixed_sites(plant) if name != component]
+    to = params.to
+    if to is None:
+        to = next((name for name in others if name[-1] == component[-1]), others[0] if others else "")
+    if to not in others:
+        raise InputError(component, "to", to, "another site: one of " + ", ".join(others))
+    where = (site_vector(plant, component), site_vector(plant, to))
+    return (SideOscillator(where, params.mass_kg, params.frequency_hz, params.damping_ratio),)
+
+
+KIND = FaultKind(
+    name="transfer_path",
+    summary="vibration finds another way: a springy mass between two measuring sites",
+    params_model=TransferPathParams,
+    components=fixed_sites,
+    place=place,
+)

@@ -1,0 +1,127 @@
+"""How a scenario wants a machine to be run beyond speed and load: its profile, its ripple, its structure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from gearsim_io.errors import InputError
+from gearsim_sim.model.assembly import Vector
+from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.plant import LOAD, MOTOR, Plant, Track
+from gearsim_sim.model.rotating_force import TIME_TRACK, RotatingForce
+from gearsim_sim.model.side_oscillator import SideOscillator
+from gearsim_sim.model.structure import StructureModel, joined_parts, with_oscillators
+from gearsim_sim.profile.build import DriveLimits, Wanted, build_profile, read_trace
+from gearsim_sim.profile.profile import Profile, load_ratio
+from gearsim_sim.profile.settings import ProfileModel, RippleModel
+
+# Ripple fades out where it is slower: a standing shaft is held.
+RIPPLE_CORNER_HZ = 1.0
+
+
+@dataclass(frozen=True)
+class Operation:
+    """The sections `profile` and `structure` of a scenario, and where they come from."""
+
+    profile: ProfileModel = field(default_factory=ProfileModel)
+    structure: StructureModel = field(default_factory=StructureModel)
+    where: str = "engine"
+    folder: Path = Path()
+
+    def machine(self, plant: Plant) -> Plant:
+        """The machine with its added structure, and with an angle for each ripple.
+
+        Raises
+        ------
+        InputError
+            For sites that the machine does not have.
+        """
+        added = self._oscillators(plant)
+        if added:
+            system = with_oscillators(plant.system, added)
+            joined = joined_parts(plant.parts, {name: one.directions for name, one in added.items()})
+            parts = tuple(tuple(dof for dof in system.dof_names if dof in part) for part in joined)
+            rigid = np.concatenate([plant.rigid, np.zeros(len(added))])
+            plant = replace(plant, system=system, parts=parts, rigid=rigid)
+        return replace(plant, tracks=(*plant.tracks, *_ripple_tracks(plant, self.profile.ripple)))
+
+    def _oscillators(self, plant: Plant) -> dict[str, SideOscillator]:
+        known = fixed_sites(plant)
+        found = {}
+        for kind in ("resonances", "paths"):
+            for number, one in enumerate(getattr(self.structure, kind)):
+                ends = one.ends
+                for end in ends:
+                    if end not in known:
+                        expected = "one of " + ", ".join(known)
+                        raise InputError(self.where, f"structure.{kind}.{number}", end, expected)
+                if len(set(ends)) != len(ends):
+                    raise InputError(self.where, f"structure.{kind}.{number}.to", ends[1], "another site")
+                where = tuple(site_vector(plant, end) for end in ends)
+                found[f"{kind}_{number + 1}"] = SideOscillator(
+                    where, one.mass_kg, one.frequency_hz, one.damping_ratio
+                )
+        return found
+
+    def course(
+        self, plant: Plant, step_s: float, speed_hz: float | None, load_nm: float, seed: int
+    ) -> Profile:
+        """The profile on a machine."""
+        limits = plant.limits
+        drive = DriveLimits(
+            step_s=step_s,
+            ratio=load_ratio(plant),
+            inertia_kg_m2=plant.inertia_kg_m2,
+            speed_hz=limits.speed_limit_hz,
+            load_nm=limits.load_limit_nm,
+            acceleration_torque_nm=limits.acceleration_torque_nm,
+        )
+        wanted = Wanted(speed_hz, load_nm, self.profile, self.where, self.folder, seed)
+        return build_profile(wanted, drive)
+
+    def first_speed_hz(self, given: float | None) -> float:
+        """The speed at the start: as given, or that of the measured trace.
+
+        Raises
+        ------
+        InputError
+            If there is neither or both, or the trace cannot be read.
+        """
+        trace = self.profile.trace
+        if (given is None) != (trace is not None):
+            expected = "a speed, or else a profile.trace"
+            raise InputError(
+                self.where, "operating_point.speed", "nothing" if given is None else given, expected
+            )
+        if trace is None:
+            assert given is not None
+            return given
+        return float(read_trace(trace, self.folder)[0].values[0])
+
+    def forces(self, plant: Plant) -> tuple[RotatingForce, ...]:
+        """Ripple of the torques, on the machine that `machine` has given."""
+        ripple = self.profile.ripple
+        first = len(plant.tracks) - len(ripple)
+        return tuple(_ripple(plant, one, first + i) for i, one in enumerate(ripple))
+
+
+def _ripple_tracks(plant: Plant, ripple: Sequence[RippleModel]) -> list[Track]:
+    """The angle that each ripple follows: `order` times that of its shaft, also where it is not whole."""
+    rates = {"motor": 1.0, "load": load_ratio(plant)}
+    return [Track(f"ripple {i}", (one.order or 0.0) * rates[one.at]) for i, one in enumerate(ripple, 1)]
+
+
+def _ripple(plant: Plant, one: RippleModel, track: int) -> RotatingForce:
+    column = plant.system.inputs[:, MOTOR if one.at == "motor" else LOAD]
+    direction: Vector = {
+        name: float(value) for name, value in zip(plant.system.dof_names, column, strict=True) if value
+    }
+    cosine, sine = one.amplitude * math.cos(one.phase), -one.amplitude * math.sin(one.phase)
+    if one.frequency is not None:
+        return RotatingForce(direction, TIME_TRACK, one.frequency, cosine, sine)
+    return RotatingForce(direction, track, 1.0, cosine, sine, corner_hz=RIPPLE_CORNER_HZ)
