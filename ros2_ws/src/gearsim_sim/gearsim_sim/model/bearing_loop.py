@@ -57,28 +57,98 @@ def ball_forces(
 
 
 @inlined
-def film_thickness(
-    gap: float, before: float, factor: float, roller: bool, unit: float, squeeze: float, squeeze_root: float
-) -> float:
-    """Thickness of an oil film after this step over that under 1 N, by an implicit step; see `oil_film`.
+def film_thickness(gap: float, before: float, factor: float, unit: float, damping: float) -> float:
+    """Thickness of a ball's film after this step over that under 1 N, by an implicit step; see `oil_film`.
 
-    c(h) (h - h_before) / step + k (gap + h)^n - Q_s(h) = 0 has one root, as the left side grows with h. The
-    constants of squeeze are over the step's length, `unit` is the thickness under 1 N.
+    c(h) (h - h_before) / step + k (gap + h)^n - Q_s(h) = 0 has one root, as the left side grows with h.
+    `damping` is h c(h) over the step, `unit` the thickness under 1 N.
     """
-    damping = squeeze + squeeze_root / math.sqrt(unit * before)
     z = before
     for _ in range(_NEWTON):
         inverse = 1.0 / z
         square = inverse * inverse
         fifth = square * square * inverse
-        carried = fifth * fifth if roller else fifth * fifth * fifth
-        elastic = max(gap + unit * z, 0.0)
-        slope = factor * (elastic ** (1.0 / 9.0) if roller else math.sqrt(elastic))
+        carried = fifth * fifth * fifth
+        elastic = gap + unit * z
+        elastic = elastic if elastic > 0.0 else 0.0
+        slope = factor * math.sqrt(elastic)
         rest = damping * (1.0 - before * inverse) + slope * elastic - carried
-        growth = damping * before * square + (10.0 / 9.0 if roller else 1.5) * slope * unit
-        growth += (10.0 if roller else 15.0) * carried * inverse
-        z = min(max(z - rest / growth, 0.5 * z), 2.0 * z)
+        growth = damping * before * square + 1.5 * slope * unit + 15.0 * carried * inverse
+        z = limited(z, rest / growth)
     return z
+
+
+@inlined
+def roller_film_thickness(gap: float, before: float, factor: float, unit: float, damping: float) -> float:
+    """The same of a roller."""
+    z = before
+    for _ in range(_NEWTON):
+        inverse = 1.0 / z
+        square = inverse * inverse
+        fifth = square * square * inverse
+        carried = fifth * fifth
+        elastic = gap + unit * z
+        elastic = elastic if elastic > 0.0 else 0.0
+        slope = factor * elastic ** (1.0 / 9.0)
+        rest = damping * (1.0 - before * inverse) + slope * elastic - carried
+        growth = damping * before * square + 10.0 / 9.0 * slope * unit + 10.0 * carried * inverse
+        z = limited(z, rest / growth)
+    return z
+
+
+@inlined
+def limited(z: float, down: float) -> float:
+    """z - down, but at least z / 2 and at most 2 z."""
+    least, most, there = 0.5 * z, 2.0 * z, z - down
+    there = there if there > least else least
+    return there if there < most else most
+
+
+@apart
+def film_ball_forces(
+    along: float, across: float, clearance: float, b: int, factor: float, memory: BearingMemory, now: Array,
+    step_s: float, balls: int,
+) -> tuple[float, float]:  # fmt: skip
+    """`ball_forces` with oil films, which move on by a step: a film of the thickness h adds to the gap."""
+    unit, damping = now[b, FILM], now[b, SQUEEZE] / step_s
+    fx = 0.0
+    fy = 0.0
+    for j in range(balls):
+        cj, sj = memory.cosines[b, j], memory.sines[b, j]
+        gap = along * cj + across * sj - clearance - memory.missing[b, j]
+        z = film_thickness(gap, memory.film[b, j], factor, unit, damping)
+        memory.film[b, j] = z
+        gap += unit * z
+        gap = gap if gap > 0.0 else 0.0
+        force = gap * math.sqrt(gap)
+        fx += force * cj
+        fy += force * sj
+    return fx, fy
+
+
+@apart
+def roller_forces(
+    along: float, across: float, clearance: float, b: int, factor: float, memory: BearingMemory, now: Array,
+    step_s: float, balls: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Sum of gap^(10/9) over the rollers in contact, in the frame of the cage; oil films as with balls."""
+    unit, squeeze = now[b, FILM], now[b, SQUEEZE_ROOT] / step_s
+    fx = 0.0
+    fy = 0.0
+    for j in range(balls):
+        cj, sj = memory.cosines[b, j], memory.sines[b, j]
+        gap = along * cj + across * sj - clearance - memory.missing[b, j]
+        if unit > 0.0:
+            before = memory.film[b, j]
+            damping = squeeze / math.sqrt(unit * before)
+            z = roller_film_thickness(gap, before, factor, unit, damping)
+            memory.film[b, j] = z
+            gap += unit * z
+        if gap > 0.0:
+            force = gap ** (10.0 / 9.0)
+            fx += force * cj
+            fy += force * sj
+    return fx, fy
 
 
 @apart
@@ -86,24 +156,20 @@ def other_forces(
     along: float, across: float, clearance: float, b: int, bearings: Bearings, memory: BearingMemory,
     now: Array, step_s: float, balls: int,
 ) -> tuple[float, float]:  # fmt: skip
-    """The same for rollers, for balls out of the middle of their pockets, and with oil films.
-
-    A film of the thickness h adds to the gap, (gap + h)^n; it moves on by a step.
-    """
+    """The same for rollers, for balls out of the middle of their pockets, and with oil films."""
     turn_balls(b, bearings, memory, now)
-    roller, unit, factor = bearings.rollers[b] != 0, now[b, FILM], bearings.numbers[b, 0]
-    squeeze, squeeze_root = now[b, SQUEEZE] / step_s, now[b, SQUEEZE_ROOT] / step_s
+    factor = bearings.numbers[b, 0]
+    if bearings.rollers[b] != 0:
+        return roller_forces(along, across, clearance, b, factor, memory, now, step_s, balls)
+    if now[b, FILM] > 0.0:
+        return film_ball_forces(along, across, clearance, b, factor, memory, now, step_s, balls)
     fx = 0.0
     fy = 0.0
     for j in range(balls):
         cj, sj = memory.cosines[b, j], memory.sines[b, j]
         gap = along * cj + across * sj - clearance - memory.missing[b, j]
-        if unit > 0.0:
-            z = film_thickness(gap, memory.film[b, j], factor, roller, unit, squeeze, squeeze_root)
-            memory.film[b, j] = z
-            gap += unit * z
         gap = gap if gap > 0.0 else 0.0
-        force = gap ** (10.0 / 9.0) if roller else gap * math.sqrt(gap)
+        force = gap * math.sqrt(gap)
         fx += force * cj
         fy += force * sj
     return fx, fy

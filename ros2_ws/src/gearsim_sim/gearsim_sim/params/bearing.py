@@ -31,25 +31,30 @@ Rows = Annotated[Count, AfterValidator(_at_most_two)]
 
 
 class RollingBearing(Strict):
-    """A ball or roller bearing, one or two rows.
-
-    `radial_clearance` is the gap on each side of a centred inner ring; negative values are a radial preload.
-    `axial_preload` presses bearings with a contact angle together, in addition. Balls need the groove radius
-    of the inner ring over the ball's diameter, and either that of the outer ring or none: then the outer
-    race is a sphere (self-aligning bearings). Rollers need their effective length instead.
-    """
+    """A ball or roller bearing, one or two rows."""
 
     element: Element = Element.BALL
+    """Shape of the rolling elements."""
     rows: Rows = 1
+    """Rows of elements; the nameplate counts those of one row."""
     row_stagger: Fraction = 0.5
+    """How far the second row is behind the first, as a part of the spacing."""
     radial_clearance_m: Annotated[float, Si("m", ge=-1e-4, le=1e-3), Field(alias="radial_clearance")]
+    """Gap on each side of a centred inner ring; negative: preload."""
     axial_preload_n: Annotated[float, Si("N", ge=0), Field(alias="axial_preload")] = 0.0
+    """Axial force that presses a bearing with a contact angle together."""
     inner_groove_conformity: Annotated[float, Si("", gt=0.5, le=1)] | None = None
+    """Groove radius of the inner race over the ball's diameter; balls need it."""
     outer_groove_conformity: Annotated[float, Si("", gt=0.5, le=1)] | None = None
+    """The same of the outer race; without it that is a sphere, as in self-aligning bearings."""
     element_length_m: Annotated[Annotated[float, Si("m", gt=0)] | None, Field(alias="element_length")] = None
+    """Effective length of a roller; rollers need it."""
     youngs_modulus_pa: Annotated[float, Si("Pa", gt=0), Field(alias="youngs_modulus")]
+    """Young's modulus of elements and rings."""
     poisson_ratio: Annotated[float, Si("", ge=0, lt=0.5)]
+    """Poisson's ratio of elements and rings."""
     nominal_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="nominal_stiffness")]
+    """Linear stiffness that the integrator splits off; it does not change the result."""
 
     @model_validator(mode="after")
     def _contacts_are_known(self) -> Any:

@@ -10,9 +10,8 @@ from gearsim_sim.model.faults import (
     gear_tooth_crack,
     gear_tooth_spall,
     gear_wear,
-    inner_race_spall,
+    of_bearings,
     of_shafts,
-    outer_race_spall,
     planet_position_error,
     planet_tooth_crack,
     planet_tooth_spall,
@@ -23,8 +22,8 @@ from gearsim_sim.model.faults import (
 from gearsim_sim.model.faults.kind import Fault, FaultKind
 
 _KINDS = (
-    outer_race_spall.KIND,
-    inner_race_spall.KIND,
+    *of_bearings.KINDS,
+    *of_shafts.KINDS,
     planet_tooth_crack.KIND,
     planet_tooth_spall.KIND,
     planet_position_error.KIND,
@@ -37,7 +36,6 @@ _KINDS = (
     profile_modification.KIND,
     gear_backlash.KIND,
     gear_misalignment.KIND,
-    *of_shafts.KINDS,
 )
 REGISTRY: dict[str, FaultKind] = {kind.name: kind for kind in _KINDS}
 

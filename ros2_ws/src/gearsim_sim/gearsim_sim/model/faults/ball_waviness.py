@@ -15,15 +15,16 @@ from gearsim_sim.params.fields import Count, Strict
 
 
 class BallWavinessParams(Strict):
-    """Lobes of the radius and the amplitude of each.
-
-    Without `ball` all elements have them, each in a phase of its own.
-    """
+    """Lobes around rolling elements; their phases depend on the seed."""
 
     orders: tuple[Count, ...] = (2, 4, 6, 8)
+    """Numbers of lobes per turn; odd ones are not felt."""
     amplitudes_m: tuple[Length, ...] = (0.3e-6, 0.15e-6, 0.1e-6, 0.07e-6)
+    """Amplitude of each, of the radius."""
     row: Count = 1
+    """Row of elements, from 1."""
     ball: Count | None = None
+    """Element of the row, from 1; by default all of all rows, each in a phase of its own."""
 
 
 def place(params: BallWavinessParams, component: str, plant: Plant, seed: int) -> tuple[SurfaceProfile, ...]:
@@ -52,4 +53,5 @@ KIND = FaultKind(
     params_model=BallWavinessParams,
     components=bearing_names,
     place=place,
+    look_for="lines at even multiples of the BSF with sidebands at the FTF, without impulses",
 )

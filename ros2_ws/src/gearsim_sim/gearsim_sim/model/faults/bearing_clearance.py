@@ -11,9 +11,10 @@ from gearsim_sim.params.fields import Strict
 
 
 class ClearanceParams(Strict):
-    """How much the gap at each side grows."""
+    """Growth of the clearance."""
 
     growth_m: Length = 15e-6
+    """How much the gap at each side grows."""
 
 
 def place(params: ClearanceParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm]:  # noqa: ARG001
@@ -30,4 +31,6 @@ KIND = FaultKind(
     params_model=ClearanceParams,
     components=bearing_names,
     place=place,
+    look_for="stronger varying compliance at the BPFO of both rows, modulated mesh lines, less stiffness "
+    "across the load",
 )

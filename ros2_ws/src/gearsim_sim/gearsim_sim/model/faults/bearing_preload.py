@@ -15,10 +15,12 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class PreloadParams(Strict):
-    """The loss of radial clearance at each side, and an axial force on bearings with a contact angle."""
+    """How a bearing is pressed together."""
 
     tightening_m: Annotated[float, SiKeyed("m", ge=0, le=1e-4)] = 10e-6
+    """Loss of radial clearance at each side."""
     axial_n: Annotated[float, SiKeyed("N", ge=0)] = 0.0
+    """Axial force, on bearings with a contact angle."""
 
 
 def place(params: PreloadParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm]:  # noqa: ARG001
@@ -43,4 +45,5 @@ KIND = FaultKind(
     params_model=PreloadParams,
     components=bearing_names,
     place=place,
+    look_for="the bearing's resonances move up and varying compliance gets weaker",
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
+from gearsim_io.errors import InputError
 from gearsim_sim.model.bearing_faults import BearingTerm, Term
 from gearsim_sim.model.cage_slip import jitter_key
 from gearsim_sim.model.faults.bearing_parts import find_seat
@@ -16,17 +17,20 @@ _NEVER_HALVED_N = 1e12
 
 
 class CageSlipParams(Strict):
-    """See `gearsim_sim.model.cage_slip`; `pocket_play_rad` is seen from the bearing's axis.
-
-    Without `halving_force_n` the slip does not depend on the load.
-    """
+    """See `gearsim_sim.model.cage_slip`."""
 
     slip: Annotated[float, SiKeyed("", ge=0, le=0.5)] = 0.01
+    """Share of its kinematic speed that the cage lags by without load."""
     halving_force_n: Annotated[float, SiKeyed("N", gt=0)] | None = None
+    """Radial force that halves the slip; by default it does not depend on the load."""
     jitter_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.5)] = 0.01
+    """Greatest angle by which the cage runs ahead or behind at random."""
     pocket_play_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.1)] = 0.005
+    """Greatest angle, seen from the bearing's axis, of an element out of the middle of its pocket."""
     knot_turns: Annotated[float, SiKeyed("", gt=0, le=100)] = 0.3
+    """Turns of the cage from one random angle to the next."""
     walk: Annotated[float, SiKeyed("", ge=0, le=1)] = 0.0
+    """Share of the slip that wanders at random, so that the phase walks without limit."""
 
 
 def place(params: CageSlipParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm, ...]:
@@ -45,6 +49,8 @@ def place(params: CageSlipParams, component: str, plant: Plant, seed: int) -> tu
         if amplitude > 0:
             turns = amplitude / (2 * math.pi)
             terms.append(BearingTerm(index, what, (turns, knots, jitter_key(seed, f"{component}/{name}"))))
+    if not terms:
+        raise InputError(component, "slip", 0.0, "some slip, jitter or play")
     return tuple(terms)
 
 
@@ -54,4 +60,6 @@ KIND = FaultKind(
     params_model=CageSlipParams,
     components=bearing_names,
     place=place,
+    look_for="with another bearing fault: its frequencies lie below the kinematic ones, and their higher "
+    "harmonics are smeared",
 )

@@ -23,21 +23,25 @@ from gearsim_sim.params.fields import Count, Strict
 
 
 class RoughnessParams(Strict):
-    """Length along the race and depth of the bucket; `wall_m` is the length of its entry and of its exit.
-
-    `roughness_m` is the rms of the topography as the elements follow it, `cutoff_m` the wavelength of which
-    they follow one half (by default what patch and radius of the contact allow). Without `row` it lies
-    across all rows.
-    """
+    """A bucket in a race, with a rough bottom."""
 
     race: Race = Race.INNER
+    """The race that has it."""
     length_m: Length = 12e-3
+    """Length along the race, from rim to rim."""
     depth_m: Length = 5e-6
+    """Mean depth of the bottom."""
     wall_m: Length = 2e-3
+    """Length of the smooth entry, and of the exit."""
     roughness_m: Length = 1e-6
+    """Rms of the topography, as the elements follow it."""
     cutoff_m: Length | None = None
+    """Wavelength of which elements follow one half; by default what patch and radius of the contact allow."""
     position_rad: Angle | None = None
+    """Azimuth of its middle at angle zero of the ring, from x towards y; by default where the load presses
+    on a ring that stands, else 0."""
     row: Count | None = None
+    """Row of elements, from 1; all rows by default."""
 
 
 def place(params: RoughnessParams, component: str, plant: Plant, seed: int) -> tuple[SurfaceProfile]:
@@ -82,4 +86,6 @@ KIND = FaultKind(
     params_model=RoughnessParams,
     components=bearing_names,
     place=place,
+    look_for="no impulses: random vibration, more of it while the zone is under load; the spectral "
+    "correlation shows it at the shaft's speed (inner race) or the BPFO (outer race)",
 )

@@ -20,4 +20,6 @@ KIND = FaultKind(
     params_model=SpallParams,
     components=bearing_names,
     place=place,
+    look_for="groups of events at the BPFI that swell and fade as the pit passes the load zone: BPFI "
+    "with sidebands at the shaft's speed",
 )

@@ -16,11 +16,14 @@ from gearsim_sim.params.fields import Count, SiKeyed, Strict
 
 
 class OffSizeParams(Strict):
-    """How much greater the diameter is (negative: smaller); `ball` and `row` count from 1."""
+    """One element of another diameter."""
 
     difference_m: Annotated[float, SiKeyed("m", ge=-1e-4, le=1e-4)] = 3e-6
+    """How much greater its diameter is; negative: smaller."""
     row: Count = 1
+    """Row of elements, from 1."""
     ball: Count = 1
+    """Element of the row, from 1."""
 
 
 def place(params: OffSizeParams, component: str, plant: Plant, seed: int) -> tuple[SurfaceProfile]:  # noqa: ARG001
@@ -39,4 +42,5 @@ KIND = FaultKind(
     params_model=OffSizeParams,
     components=bearing_names,
     place=place,
+    look_for="a slow beat at the FTF, as the greater element carries more each time it passes the load zone",
 )

@@ -13,10 +13,12 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class OilFilmParams(Strict):
-    """Dynamic viscosity at the inlet, and how steeply it rises with pressure (mineral oil: 2e-8)."""
+    """An oil at the temperature of the bearing."""
 
     viscosity_pa_s: Annotated[float, SiKeyed("Pa*s", gt=0, le=100)] = 0.1
+    """Dynamic viscosity at the inlet of the contacts."""
     pressure_viscosity_1_per_pa: Annotated[float, SiKeyed("1/Pa", gt=0, le=1e-6)] = 2e-8
+    """How steeply its logarithm rises with pressure; mineral oils have about 2e-8."""
 
 
 def place(params: OilFilmParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm]:  # noqa: ARG001
@@ -37,4 +39,5 @@ KIND = FaultKind(
     params_model=OilFilmParams,
     components=bearing_names,
     place=place,
+    look_for="with another bearing fault: softer exits, less at high frequencies",
 )

@@ -20,4 +20,6 @@ KIND = FaultKind(
     params_model=SpallParams,
     components=bearing_names,
     place=place,
+    look_for="pairs of events, unloading and impact, at the BPFO; its harmonics stand in the envelope "
+    "spectrum without sidebands",
 )

@@ -14,15 +14,16 @@ from gearsim_sim.params.fields import Count, Strict
 
 
 class WavinessParams(Strict):
-    """Numbers of lobes per turn and the amplitude of each; their phases depend on the seed.
-
-    Without `row` both rows run on it.
-    """
+    """Lobes around a race; their phases depend on the seed."""
 
     race: Race = Race.INNER
+    """The race that has them."""
     orders: tuple[Count, ...] = (2, 3, 5, 7, 11, 13)
+    """Numbers of lobes per turn."""
     amplitudes_m: tuple[Length, ...] = (1e-6, 0.7e-6, 0.4e-6, 0.3e-6, 0.2e-6, 0.15e-6)
+    """Amplitude of each."""
     row: Count | None = None
+    """Row of elements, from 1; all rows by default."""
 
 
 def place(params: WavinessParams, component: str, plant: Plant, seed: int) -> tuple[SurfaceProfile]:
@@ -51,4 +52,7 @@ KIND = FaultKind(
     params_model=WavinessParams,
     components=bearing_names,
     place=place,
+    look_for="lines without impulses: with Z elements in a row, lobes of orders k Z - 1 and k Z + 1 "
+    "press radially, at k BPFI -/+ the shaft's speed for the inner race, at k BPFO for the "
+    "outer",
 )

@@ -16,14 +16,20 @@ from gearsim_sim.params.fields import Count, Strict
 
 
 class ElementSpallParams(Strict):
-    """`ball` and `row` count from 1; at `position_rad` zero the pit touches the outer race at the start."""
+    """A pit of one element."""
 
     width_m: Length = 0.8e-3
+    """Width along the surface of the element."""
     depth_m: Length = 0.3e-3
+    """Depth; more than the races can reach makes no difference."""
     position_rad: Angle = 0.0
+    """Angle on the element: at zero the pit touches the outer race at the start."""
     row: Count = 1
+    """Row of elements, from 1."""
     ball: Count = 1
+    """Element of the row, from 1."""
     geometry: Geometry = Geometry.ROUNDED
+    """The race rolls over the edges, or the whole depth is missing at once."""
 
 
 def place(params: ElementSpallParams, component: str, plant: Plant, seed: int) -> tuple[Spall, Spall]:  # noqa: ARG001
@@ -62,4 +68,6 @@ KIND = FaultKind(
     params_model=ElementSpallParams,
     components=bearing_names,
     place=place,
+    look_for="events at twice the BSF (once at each race) while the element is in the load zone: "
+    "harmonics of 2 BSF with sidebands at the FTF",
 )

@@ -19,16 +19,19 @@ from gearsim_sim.params.fields import Count, Strict
 
 
 class SpallParams(Strict):
-    """Parameters common to the spalls of both races.
-
-    `depth_m` beyond what the ball can reach makes no difference. `row` counts from 1.
-    """
+    """Parameters common to the spalls of both races."""
 
     width_m: Length = 0.8e-3
+    """Width along the race."""
     depth_m: Length = 0.3e-3
+    """Depth; more than the element can reach makes no difference."""
     position_rad: Angle | None = None
+    """Azimuth of its middle at angle zero of the ring, from x towards y; by default where the load presses
+    on a ring that stands, else 0."""
     row: Count = 1
+    """Row of elements, from 1."""
     geometry: Geometry = Geometry.ROUNDED
+    """Elements roll over the edges, or the whole depth is missing at once."""
 
 
 def place_spall(params: SpallParams, component: str, plant: Plant, race: Race) -> Spall:

@@ -26,14 +26,21 @@ _POINTS_PER_PATCH = 24  # of the path's table along half of a contact patch
 
 
 class WideSpallParams(Strict):
-    """`length_m` lies along the race between the edges; `edge_radius_m` is how round these are worn."""
+    """A pit with a floor, of any length."""
 
     race: Race = Race.OUTER
+    """The race that has it."""
     length_m: Length = 8e-3
+    """Length along the race, from edge to edge."""
     depth_m: Length = 20e-6
+    """Depth of the floor."""
     edge_radius_m: Length = 0.1e-3
+    """How round the edges are worn."""
     position_rad: Angle | None = None
+    """Azimuth of its middle at angle zero of the ring, from x towards y; by default where the load presses
+    on a ring that stands, else 0."""
     row: Count = 1
+    """Row of elements, from 1."""
 
 
 def place(params: WideSpallParams, component: str, plant: Plant, seed: int) -> tuple[SurfaceProfile]:  # noqa: ARG001
@@ -79,4 +86,6 @@ KIND = FaultKind(
     params_model=WideSpallParams,
     components=bearing_names,
     place=place,
+    look_for="separate events at entry and exit, whose distance tells the length; BPFO or BPFI, and more "
+    "low-frequency motion, since the ring comes down to the floor",
 )
