@@ -54,7 +54,7 @@ def test_compiled_run_equals_dop853(plant, faulty):
     """Accelerations of carrier, and of ring and sun in the carrier's frame, against the readable plant.
 
     At 4 steps per sample of 65536 Hz. The start from rest on moving teeth is a jump, which the scheme takes
-    less exactly (5e-3); compared is what follows after 2 ms, where all but the slowest modes have forgotten it.
+    less exactly (5e-3); compared is what follows after 2 ms, where all but the slowest modes forgot it.
     """
     turns, seconds, rate = 0.3, 5e-3, 65536 * 4
     names = ("y_c", "x_r", "y_r", "x_s", "y_s", "theta_p1")
