@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "demo",
     "run": "run",
     "simulate": "simulate",
+    "ensemble": "ensemble",
     "import": "import_files",
     "record": "record",
     "play": "play",
