@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from gearsim_sim.engine import Engine, EngineOutput
 from gearsim_sim.events import Event, FaultSpec
-from gearsim_sim.params import load_parallel_params, load_planetary_params
+from gearsim_sim.params import load_bearing_rig_params, load_parallel_params, load_planetary_params
 
 if TYPE_CHECKING:
     from gearsim_sim.scenario import Scenario
@@ -68,7 +68,15 @@ def _planetary(scenario: Scenario) -> Any:
     return load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
 
 
+def _bearing_rig(scenario: Scenario, *, dofs: Literal[2, 4, 5]) -> Any:
+    params = load_bearing_rig_params(scenario.machine_path, scenario.parameters, scenario.source)
+    return params.with_dofs(dofs)
+
+
 _PARAMETERS: Mapping[str, Callable[[Scenario], Any]] = {
+    "bearing2": partial(_bearing_rig, dofs=2),
+    "bearing4": partial(_bearing_rig, dofs=4),
+    "bearing5": partial(_bearing_rig, dofs=5),
     "lpm22": partial(_parallel_shaft, pedestals=False),
     "lpm34": partial(_parallel_shaft, pedestals=True),
     "planetary18": _planetary,

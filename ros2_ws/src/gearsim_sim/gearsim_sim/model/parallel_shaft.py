@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 
-from gearsim_io.errors import InputError
 from gearsim_sim.model.assembly import Assembly, LinearSystem, Vector
 from gearsim_sim.model.ball_bearing import BallBearing, make_ball_bearing
 from gearsim_sim.model.bearing_seat import BearingSeat
@@ -41,7 +40,7 @@ def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
     model, physics = params.model, params.physics
     pair = params.gear_pair
     curve = stiffness_curve(model.mesh, pair, variation=physics.mesh_stiffness_variation)
-    system = _assemble(model, curve.mean_n_per_m, pedestals=params.pedestals)
+    system = _assemble(params, curve.mean_n_per_m)
     x_names = tuple(name for name in system.dof_names if name.startswith("x_"))
     rigid = dict.fromkeys(_ROTATIONS[INPUT], 1.0) | dict.fromkeys(_ROTATIONS[OUTPUT], params.speed_ratio)
     laws = _bearing_laws(params)
@@ -139,12 +138,13 @@ def _bearing_laws(params: ParallelParams) -> tuple[BallBearing, ...]:
     return tuple(
         make_ball_bearing(
             plate,
-            params.model.ball_bearing,
+            own,
             load_direction_rad=LOAD_DIRECTION_RAD[i],
             passing=params.physics.ball_passing,
             clearance=params.physics.clearance,
+            where=f"{params.where}: {plate.name}",
         )
-        for i, plate in enumerate(params.bearings)
+        for i, (plate, own) in enumerate(zip(params.bearings, params.rolling_bearings, strict=True))
     )
 
 
@@ -159,19 +159,18 @@ def _seat(params: ParallelParams, system: LinearSystem, number: int, law: BallBe
         spin=2 + len(BEARINGS) + number,
         inner=Ring(shaft, SENSE[shaft]),
         outer=Ring(),
-        nominal_stiffness_n_per_m=params.model.ball_bearing.nominal_stiffness_n_per_m,
+        nominal_stiffness_n_per_m=params.rolling_bearings[number].nominal_stiffness_n_per_m,
     )
 
 
 def _check_load_zones(params: ParallelParams, bearings: tuple[BallBearing, ...]) -> None:
     """Under the nominal load each bearing must rest on more than a single ball at a time."""
-    drive, clearance = params.model.drive, params.model.ball_bearing.radial_clearance_m
-    load_n = drive.load_nm / params.model.gear.base_radius_m / 2
-    for bearing in bearings:
-        zone = 2 * bearing.load_zone_half_angle_rad(load_n)
-        if load_n > 0 and zone < bearing.ball_spacing_rad / bearing.rows:
-            expected = f"a clearance that leaves a load zone under {load_n:.3g} N (this: {zone:.2g} rad)"
-            raise InputError(params.where, "ball_bearing.radial_clearance", clearance, expected)
+    model = params.model
+    load_n = model.drive.load_nm / model.gear.base_radius_m / 2
+    for name, bearing in zip(BEARINGS, bearings, strict=True):
+        own = model.seats[name].bearing is not None
+        section = f"seats.{name}.bearing" if own else "ball_bearing"
+        bearing.check_load_zone(params.where, f"{section}.radial_clearance", load_n)
 
 
 _ROTATIONS = (
@@ -180,8 +179,8 @@ _ROTATIONS = (
 )
 
 
-def _assemble(model: ParallelModel, mesh_stiffness_n_per_m: float, *, pedestals: bool) -> LinearSystem:
-    assembly = Assembly()
+def _assemble(params: ParallelParams, mesh_stiffness_n_per_m: float) -> LinearSystem:
+    model, pedestals, assembly = params.model, params.pedestals, Assembly()
     _add_inertias(assembly, model)
     if pedestals:
         for number in range(1, 5):
@@ -197,7 +196,7 @@ def _assemble(model: ParallelModel, mesh_stiffness_n_per_m: float, *, pedestals:
             across = {f"{axis}_s{number}": 1.0}
             if pedestals:
                 across[f"{axis}_p{number}"] = -1.0
-            assembly.spring(across, model.ball_bearing.nominal_stiffness_n_per_m)
+            assembly.spring(across, params.rolling_bearings[number - 1].nominal_stiffness_n_per_m)
             assembly.damper(across, seat.damping_ns_per_m)
             assembly.interface(f"b{number}_{axis}", across)
     along = mesh_direction(model.pinion.base_radius_m, model.gear.base_radius_m)

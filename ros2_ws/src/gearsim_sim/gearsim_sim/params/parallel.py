@@ -7,7 +7,9 @@ so that they have one home.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,6 +28,9 @@ from gearsim_sim.params.teeth import Teeth
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
 MODEL_KIND = "parallel_shaft"
+# Working pressure angles of spur gears that can be made; 14.5 to 25 degrees are usual.
+_FIT_M = 1e-7  # to which distances are written down
+_PRESSURE_ANGLES_RAD = (math.radians(10), math.radians(35))
 # Base radii of teeth and model may differ by this part: numbers of YAML are written with three digits.
 _SAME_RADIUS = 1e-3
 
@@ -54,6 +59,12 @@ class Seat(Strict):
     damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
 
 
+class GearboxSeat(Seat):
+    """A seat of the gearbox; `bearing` changes numbers of the section `ball_bearing` for this one."""
+
+    bearing: RollingBearing | None = None
+
+
 class Shafts(Strict):
     """Stiffness of each shaft half, from gear to bearing."""
 
@@ -74,6 +85,9 @@ class MeshStiffness(Strict):
     contact_ratio: Annotated[float, Si("", gt=1, lt=2)]
     pair_stiffness_ratio: Annotated[float, Si("", ge=1, le=2)]
     harmonics: Count
+    centre_distance_m: Annotated[Annotated[float, Si("m", gt=0)] | None, Field(alias="centre_distance")] = (
+        None
+    )
 
 
 class GearErrors(Strict):
@@ -135,7 +149,7 @@ class ParallelModel(Strict):
     pinion: Gear
     gear: Gear
     shafts: Shafts
-    seats: dict[str, Seat]
+    seats: dict[str, GearboxSeat]
     mesh: MeshStiffness
     teeth: Teeth | None = None
     gear_errors: GearErrors
@@ -162,8 +176,20 @@ class ParallelParams(Strict):
         return self.mesh.driving_teeth / self.mesh.driven_teeth
 
     @property
+    def rolling_bearings(self) -> tuple[RollingBearing, ...]:
+        """What the nameplate does not tell of each bearing, in the order of `BEARINGS`."""
+        seats = (self.model.seats[name] for name in BEARINGS)
+        return tuple(seat.bearing or self.model.ball_bearing for seat in seats)
+
+    @property
     def gear_pair(self) -> GearPair | None:
         """The teeth in mesh, if the model describes them; InputError if there are no such gears."""
+        pair = self.tight_pair
+        return None if pair is None else self._at_its_distance(pair)
+
+    @property
+    def tight_pair(self) -> GearPair | None:
+        """The same without backlash."""
         if self.model.teeth is None:
             return None
         try:
@@ -172,6 +198,21 @@ class ParallelParams(Strict):
         except InputError as error:
             raise InputError(self.where, f"teeth.{error.field}", error.value, error.expected) from None
         return pair
+
+    def _at_its_distance(self, pair: GearPair) -> GearPair:
+        """The pair with its axes where `mesh.centre_distance` puts them."""
+        distance = self.model.mesh.centre_distance_m
+        if distance is None:
+            return pair
+        spread, field = distance - pair.centre_distance_m, "mesh.centre_distance"
+        if spread < -_FIT_M:
+            expected = f"at least {pair.centre_distance_m:.9g} m, where these teeth mesh without backlash"
+            raise InputError(self.where, field, distance, expected)
+        try:
+            return replace(pair, spread_m=max(spread, 0.0))
+        except InputError as error:
+            expected = f"nearer to {pair.centre_distance_m:.9g} m: {error.field} {error.expected}"
+            raise InputError(self.where, field, distance, expected) from None
 
     def with_physics(self, **switches: bool) -> ParallelParams:
         """The same machine with some physics switched (`gravity=False`)."""
@@ -208,7 +249,7 @@ def load_parallel_params(
     if overrides:
         section = override(section, overrides, source or where)
         where = f"{source or where} (parameters, with {path})"
-    model = validate(ParallelModel, section, where, require_source=True)
+    model = validate(ParallelModel, _with_own_bearings(section), where, require_source=True)
     mesh = _single_mesh(where, plate)
     params = ParallelParams(
         where=where,
@@ -220,6 +261,19 @@ def load_parallel_params(
     )
     _check(params)
     return params
+
+
+def _with_own_bearings(section: Mapping[str, Any]) -> dict[str, Any]:
+    """The section with `seats.*.bearing` completed from `ball_bearing`, which all four share."""
+    seats, common = section.get("seats"), section.get("ball_bearing")
+    if not isinstance(seats, Mapping) or not isinstance(common, Mapping):
+        return dict(section)  # the validation tells
+
+    def completed(seat: Any) -> Any:
+        own = seat.get("bearing") if isinstance(seat, Mapping) else None
+        return {**seat, "bearing": {**common, **own}} if isinstance(own, Mapping) else seat
+
+    return {**section, "seats": {name: completed(seat) for name, seat in seats.items()}}
 
 
 def _single_mesh(where: str, plate: Machine) -> GearMesh:
@@ -251,10 +305,7 @@ def _check(params: ParallelParams) -> None:
     model, where = params.model, params.where
     if set(model.seats) != set(BEARINGS):
         raise InputError(where, "seats", sorted(model.seats), ", ".join(BEARINGS))
-    radii = model.gear.base_radius_m / model.pinion.base_radius_m
-    teeth = params.mesh.driven_teeth / params.mesh.driving_teeth
-    if abs(radii / teeth - 1) > 1e-9:
-        raise InputError(where, "gear.base_radius", radii, f"radii in the ratio of the teeth, {teeth:.9g}")
+    _check_teeth(params)
     _check_tooth_data(params)
     if model.drive.speed_hz > model.drive.speed_limit_hz:
         raise InputError(where, "drive.speed", model.drive.speed_hz, f"<= {model.drive.speed_limit_hz} Hz")
@@ -262,9 +313,31 @@ def _check(params: ParallelParams) -> None:
         raise InputError(where, "drive.load", model.drive.load_nm, f"<= {model.drive.load_limit_nm} N m")
 
 
+def _check_teeth(params: ParallelParams) -> None:
+    """Gears that cannot be put together: unlike pitches, or axes at a distance where teeth do not meet."""
+    model, where = params.model, params.where
+    pinion, gear, mesh = model.pinion.base_radius_m, model.gear.base_radius_m, params.mesh
+    due = pinion * mesh.driven_teeth / mesh.driving_teeth
+    if abs(gear / due - 1) > 1e-9:
+        expected = (
+            f"{due:.12g} m, so that {mesh.driving_teeth} and {mesh.driven_teeth} teeth have one base pitch"
+        )
+        raise InputError(where, "gear.base_radius", gear, expected)
+    distance = model.mesh.centre_distance_m
+    if distance is None:
+        return
+    low, high = ((pinion + gear) / math.cos(angle) for angle in _PRESSURE_ANGLES_RAD)
+    if not low <= distance <= high:
+        expected = (
+            f"{low:.6g} to {high:.6g} m, where {mesh.driving_teeth} and {mesh.driven_teeth} teeth of these "
+            f"base radii meet at a pressure angle of 10 to 35 degrees"
+        )
+        raise InputError(where, "mesh.centre_distance", distance, expected)
+
+
 def _check_tooth_data(params: ParallelParams) -> None:
     """The teeth must be there if they are needed, possible, and those of the model's base circles."""
-    model, pair = params.model, params.gear_pair
+    model, pair = params.model, params.tight_pair
     if pair is None:
         if model.mesh.stiffness_model != "tabulated":
             expected = f"this section, since mesh.stiffness_model is {model.mesh.stiffness_model}"
@@ -276,3 +349,4 @@ def _check_tooth_data(params: ParallelParams) -> None:
             f"teeth with the pinion's base radius {radius:g} m; these have {pair.pinion.base_radius_m:.6g} m"
         )
         raise InputError(params.where, "teeth.module", model.teeth and model.teeth.module_m, expected)
+    _ = params.gear_pair  # refuses axes where these teeth do not meet
