@@ -1,6 +1,7 @@
 """Gear faults in the running machine: against DOP853, contact loss, line structure, the registry's rules."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,10 @@ from gearsim_sim.model.mesh_terms import BACKLASH, LEAD_GAP, MeshPulse, MeshTerm
 from gearsim_sim.model.plant import Moment
 from gearsim_sim.model.plants import make_plant
 from gearsim_sim.model.statics import static_equilibrium
+from gearsim_sim.model.tooth.stiffness import stiffness_series
+from gearsim_sim.model.tooth.windows import scaled, stretched
 from gearsim_sim.params import load_parallel_params
+from gearsim_sim.params.planetary import load_planetary_params
 from gearsim_sim.schedule import ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Stepper
 
@@ -426,3 +430,35 @@ def test_impossible_teeth_of_the_machine(overrides, field):
     with pytest.raises(InputError) as error:
         make_plant(load_parallel_params(overrides=overrides), 1)
     assert error.value.field == field
+
+
+# Sun and ring
+
+
+@pytest.mark.parametrize("input_member", ["carrier", "sun"])
+def test_teeth_of_sun_and_ring_meet_the_planets_in_phase(input_member):
+    """All teeth of a wheel together make the mesh stiffness of the model, in every mesh, at every angle."""
+    params = load_planetary_params(overrides={"mesh.potential_energy": 1})
+    stage = replace(params.stage, input_member=input_member)
+    plant = make_plant(params.model_copy(update={"stage": stage}), 1)
+    assert {wheel.mesh for wheel in plant.wheels} == set(range(6))
+    for wheel in plant.wheels:
+        mesh = plant.meshes[wheel.mesh]
+        whole = stretched(stiffness_series(wheel.pair, int(params.model.mesh.harmonics)), wheel.gear.teeth)
+        placed = wheel.placed(scaled(whole, mesh.mean_stiffness_n_per_m / whole.mean))
+        for turns in (0.0, 0.137, 0.81):
+            phases = plant.phases(turns)
+            assert placed.value(phases[wheel.track]) == pytest.approx(mesh.stiffness_at(phases), rel=1e-9)
+
+
+def test_a_cracked_sun_tooth_meets_every_planet_once_per_turn():
+    """The sun overtakes the planets a third of a turn apart: one tooth, three times per relative turn."""
+    plant = make_plant(load_planetary_params(), 1)
+    fault = REGISTRY["gear_tooth_crack"].build(FaultSpec("gear_tooth_crack", "sun", {"tooth": 7}), plant)
+    assert [one.mesh for one in fault.contributions] == [0, 1, 2]
+    turns = np.arange(6000) / 6000
+    at = [turns[np.argmin(one.series.value(turns))] for one in fault.contributions]
+    assert np.diff(at) % 1 == pytest.approx([1 / 3, 1 / 3], abs=1e-3)
+    teeth = plant.wheels[0].gear.teeth
+    assert fault.contributions[0].series.mean == pytest.approx(fault.contributions[1].series.mean)
+    assert -fault.contributions[0].series.mean * teeth > 0.01 * plant.meshes[0].mean_stiffness_n_per_m

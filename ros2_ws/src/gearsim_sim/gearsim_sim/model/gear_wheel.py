@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gearsim_sim.model.periodic import PeriodicSeries
 from gearsim_sim.model.tooth.gear import SpurGear
@@ -27,11 +27,14 @@ class GearWheel:
     of_wheel : bool
         It is the wheel of the pair (else its pinion).
     start_turns : float
-        Angle of the track at which tooth 0 is half a pitch before the middle of its contact.
+        Angle of the track at which tooth 0 is half a pitch before the middle of its contact (after it if
+        `sense` is -1).
     force_per_load_n_per_nm : float
         Mean force of the mesh over the load torque.
     harmonics : int
         Lines of the tooth mesh that functions of the teeth keep.
+    sense : int
+        +1 if contact moves from root to tip of the pinion's teeth as the track turns, else -1.
     """
 
     name: str
@@ -42,6 +45,7 @@ class GearWheel:
     start_turns: float
     force_per_load_n_per_nm: float
     harmonics: int
+    sense: int = 1
 
     @property
     def gear(self) -> SpurGear:
@@ -54,5 +58,9 @@ class GearWheel:
         return 2 * self.mesh + int(self.of_wheel)
 
     def placed(self, series: PeriodicSeries) -> PeriodicSeries:
-        """A function of the turn since tooth 0 was half a pitch before its contact, over the track."""
-        return shifted(series, self.start_turns) if self.start_turns else series
+        """A function of the turn since tooth 0 was half a pitch before its contact, over the track.
+
+        The function is that of a pair in which contact moves from root to tip of the pinion's teeth.
+        """
+        forward = series if self.sense > 0 else replace(series, sine=-series.sine)
+        return shifted(forward, self.start_turns) if self.start_turns else forward

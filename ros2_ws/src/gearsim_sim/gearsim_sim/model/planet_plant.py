@@ -16,6 +16,7 @@ from gearsim_sim.model.first_stage import INTERFACE, first_stage_contact_ratio, 
 from gearsim_sim.model.gear_mesh import Mesh, MeshError
 from gearsim_sim.model.planet_geometry import StageGeometry, make_geometry
 from gearsim_sim.model.planet_meshes import make_meshes, two_pair_stiffness, wheel_error
+from gearsim_sim.model.planet_wheels import planetary_wheels
 from gearsim_sim.model.planetary import assemble, rigid_vector
 from gearsim_sim.model.plant import Limits, Plant, RotatingSite, Track
 from gearsim_sim.model.ring import Ring
@@ -71,6 +72,7 @@ def make_planetary(params: PlanetaryParams, seed: int) -> PlanetaryPlant:
         ),
         gravity_m_per_s2=0.0,
         faults_on=params.physics.faults,
+        wheels=planetary_wheels(params, geometry, index),
         params=params,
         geometry=geometry,
     )

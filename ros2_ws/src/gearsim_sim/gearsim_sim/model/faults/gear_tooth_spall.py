@@ -82,7 +82,8 @@ def _pulses(wheel: GearWheel, spall: ToothSpall, tooth: int) -> list[MeshPulse]:
     edges = np.array([first, *sorted(p for p in handovers(wheel.pair) if first < p < last), last])
     share = shares(wheel.pair, (edges[1:] + edges[:-1]) / 2)
     teeth = wheel.gear.teeth
-    starts = ((edges[:-1] + tooth + 0.5) / teeth + wheel.start_turns) % 1.0
+    ends = (edges + tooth + 0.5) / teeth
+    starts = (np.minimum(wheel.sense * ends[:-1], wheel.sense * ends[1:]) + wheel.start_turns) % 1.0
     heights = -spall.depth_m * spall.face_fraction * share
     return [
         MeshPulse(wheel.mesh, ERROR, wheel.track, float(start), float(width), float(height))

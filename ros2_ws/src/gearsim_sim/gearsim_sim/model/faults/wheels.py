@@ -63,7 +63,8 @@ def stiffness_mod(plant: Plant, wheel: GearWheel, series: PeriodicSeries, max_se
     """
     teeth = wheel.gear.teeth
     turns = np.arange(64 * teeth) / (64 * teeth)
-    sound = plant.meshes[wheel.mesh].stiffness.value(turns * teeth)
+    own = stiffness_series(wheel.pair, wheel.harmonics)
+    sound = scale_of(plant, wheel) * own.value(turns * teeth)
     left = sound + max_severity * series.value(turns)
     if np.min(left) < _LEAST * np.min(sound):
         lost = f"{100 * float(np.max(-series.value(turns) / sound)):.3g} % less"
