@@ -11,6 +11,12 @@ def fixed_sites(plant: Plant) -> tuple[str, ...]:
     return tuple(name for name, site in plant.sites.items() if not isinstance(site, RotatingSite))
 
 
+def joinable_sites(plant: Plant) -> tuple[str, ...]:
+    """Such sites, if there are two or more that something can lie between."""
+    found = fixed_sites(plant)
+    return found if len(found) > 1 else ()
+
+
 def site_vector(plant: Plant, name: str) -> Vector:
     """The direction of such a site."""
     site = plant.sites[name]

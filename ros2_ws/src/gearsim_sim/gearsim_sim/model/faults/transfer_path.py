@@ -7,7 +7,7 @@ from typing import Annotated
 from gearsim_io.errors import InputError
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults.kind import FaultKind
-from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.faults.on_site import fixed_sites, joinable_sites, site_vector
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.side_oscillator import SideOscillator
 from gearsim_sim.params.fields import SiKeyed, Strict
@@ -41,6 +41,6 @@ KIND = FaultKind(
     name="transfer_path",
     summary="vibration finds another way: a springy mass between two measuring sites",
     params_model=TransferPathParams,
-    components=fixed_sites,
+    components=joinable_sites,
     place=place,
 )
