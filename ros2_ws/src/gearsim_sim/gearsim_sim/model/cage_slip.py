@@ -43,10 +43,11 @@ def knot_value(key: int, knot: int) -> float:
     return ((state ^ (state >> 31)) >> 11) * 2.0**-52 - 1.0
 
 
-def jitter(key: int, position: float) -> float:
-    """A smooth random function of the position in knots, >= 0, within [-1, 1)."""
-    knot = int(position)
-    u = position - knot
+def jitter(key: int, position: float, first_knot: int = 0) -> float:
+    """A smooth random function of the position in knots, >= 0, within [-1, 1); position 0 is `first_knot`."""
+    whole = int(position)
+    u = position - whole
+    knot = first_knot + whole
     rise = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
     return knot_value(key, knot) * (1.0 - rise) + knot_value(key, knot + 1) * rise
 
