@@ -149,3 +149,49 @@ def test_errata_mesh_acts_along_y_with_opposite_signs(system):
     assert {name: value for name, value in column.items() if value} == pytest.approx(
         {"theta_pin": RP, "theta_ge": -RG, "y_pin": -1.0, "y_ge": 1.0}
     )
+
+
+def test_errata_4_15_and_4_16_count_turns():
+    """T is the period: with the rotational speed in its place a run-out would come 1 / f^2 times a turn."""
+    speed_hz = 10.0
+    mesh = make_plant(load_parallel_params(), seed=3).meshes[0]
+    runout = mesh.errors[0].series
+    assert runout.orders[0] == 1  # once a turn: t / T with T = 1 / f
+    seconds = np.arange(1000) / 1000 / speed_hz
+    once = np.cos(2 * np.pi * seconds * speed_hz + 1.0)
+    as_printed = np.cos(2 * np.pi * seconds / speed_hz + 1.0)
+    assert abs(once.mean()) < 1e-12
+    assert abs(as_printed.mean()) > 0.5  # hardly moves within a turn
+
+
+@pytest.mark.parametrize("step_s", [1e-5, 1e-6])
+def test_errata_4_17_error_has_a_rate_at_any_step(step_s):
+    """A new random number each sample has no rate: its differences grow without bound as steps shrink."""
+    mesh = make_plant(load_parallel_params(), seed=3).meshes[0]
+    turns = 0.3 + 10.0 * step_s * np.arange(3)
+    ours = np.diff([mesh.error(mesh_phases(turn)) for turn in turns]) / step_s
+    assert ours[0] == pytest.approx(ours[1], rel=0.1)
+    exact = mesh.error_rate(mesh_phases(turns[0] + 5 * step_s), np.full(2, 10.0))
+    assert ours[0] == pytest.approx(exact, rel=0.02)
+    printed = np.diff(0.2e-6 * np.random.default_rng(1).normal(size=1000)) / step_s
+    assert printed.std() == pytest.approx(0.2e-6 * np.sqrt(2) / step_s, rel=0.1)
+
+
+def mesh_phases(turns):
+    return np.full(2, turns)
+
+
+def test_errata_tables_a1_and_b1_are_two_models():
+    """580 and 300 N m/rad belong to this model (Table A.1), 740 and 3000 to the one of Table B.1."""
+    model = load_parallel_params().model
+    assert (model.flywheel_1.stiffness_nm_per_rad, model.flywheel_2.stiffness_nm_per_rad) == (580, 580)
+    assert (model.encoder_1.stiffness_nm_per_rad, model.encoder_2.stiffness_nm_per_rad) == (300, 300)
+
+
+def test_errata_ball_spin_frequency_of_section_5_5():
+    """26.1 Hz at 10 Hz, where 26.5 is printed; the bearing and the other frequencies are those of 5.5."""
+    law = make_plant(load_parallel_params(), seed=3).bearings[2].law
+    ball, pitch = 7.12, 38.5
+    assert 10 * pitch / (2 * ball) * (1 - (ball / pitch) ** 2) == pytest.approx(26.1, abs=0.05)
+    assert abs(law.spin_rate(10.0)) == pytest.approx(26.1, abs=0.05)
+    assert abs(law.cage_rate(10.0)) == pytest.approx(4.1, abs=0.05)

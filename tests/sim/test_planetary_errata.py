@@ -10,6 +10,9 @@ import pytest
 from oracles import plain_planetary as plain
 from oracles.plain_planetary import PRINTED, READING, TABLE_7_6, asymmetry, eigenvalues, printed_stiffness
 
+from gearsim_sim.model.planet_meshes import wheel_error
+from gearsim_sim.params import load_planetary_params
+
 
 def test_the_unchanged_blocks_are_the_oracle():
     _, _, stiffness = plain.matrices(**READING)
@@ -189,3 +192,17 @@ def test_errata_ring_inertia_and_damper():
     assert READING["ring_damping"] / (2 * math.sqrt(plain.KBR * plain.MR)) == pytest.approx(0.05, rel=1e-3)
     torsional = 2 * math.sqrt(plain.KBRT * READING["ring_inertia"])
     assert READING["ring_torsional_damping"] / torsional == pytest.approx(0.05, rel=1e-2)
+
+
+def test_errata_7_41_and_7_42_are_one_line():
+    """Two definitions of the same error; (7.41) goes on as (7.43), 1 um / k, and is the one taken."""
+    first = [1e-6 / k for k in (1, 2)]
+    second = [4e-6 / 4 ** (k - 1) for k in (1, 2)]
+    assert abs(second[0] / first[0] - 1) > 1  # not to be had at once
+    params = load_planetary_params().with_physics(runout=False, tooth_surface=False)
+    error = wheel_error(params, 20, seed=1, wheel=2)
+    profile = np.isin(error.orders, 20 * np.arange(1, 11))
+    amplitude = np.hypot(error.cosine, error.sine)[profile]
+    assert amplitude == pytest.approx(1e-6 / np.arange(1, 11))
+    runout = wheel_error(load_planetary_params(), 20, seed=1, wheel=2)
+    assert np.hypot(runout.cosine, runout.sine)[:3] == pytest.approx(20e-6 / np.arange(1, 4) ** 2)
