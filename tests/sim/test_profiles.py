@@ -275,6 +275,13 @@ def test_a_trace_through_rest_stays_at_rest():
     )
 
 
+def test_a_trace_that_ends_at_rest_stands_there():
+    speed = np.array([6, 6.1, 6, 5, 3, 1, 0.0])
+    curve = trace_curve(Trace("t.csv", np.arange(7.0), speed), STEP_S, 0.0, "speed")
+    assert curve.stretch(seconds(6.5)).value(float(seconds(6.5))) == pytest.approx(0.0, abs=1e-9)
+    assert_smooth(walk(profile(curve, Constant(20.0)), -1000, seconds(7.0)), 6.0)
+
+
 @pytest.mark.parametrize(
     ("time_s", "values", "field"),
     [

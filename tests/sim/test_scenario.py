@@ -143,7 +143,7 @@ BAD = [
     ("timeline: [{at: -1 s, clear: {}}]", "timeline.0.at: got -1 s, expected a number in s, >= 0"),
     ("timeline: [{at: 1 s}]", "expected one of inject, set, clear beside at"),
     ("timeline: [{at: 1 s, clear: {}, set: {}}]", "expected one of inject, set, clear beside at"),
-    ("timeline: [{at: 1 s, set: {speed: 0 Hz}}]", "timeline.0.set.speed: got 0 Hz, expected"),
+    ("timeline: [{at: 1 s, set: {speed: -1 Hz}}]", "timeline.0.set.speed: got -1 Hz, expected"),
     ("sensors: {accelerometers: {chain: gold}}", "sensors.accelerometers.chain: got gold, expected one of"),
     ("seed: 1\nseed: 2", "expected valid YAML"),
     ("model: [", "expected valid YAML"),

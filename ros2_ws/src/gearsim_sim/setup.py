@@ -20,7 +20,9 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
-    package_data={NAME: ["scenarios/*.yaml", "sensors/*.yaml", "sensors/catalogue/*/*.yaml"]},
+    package_data={
+        NAME: ["scenarios/*.yaml", "scenarios/*.csv", "sensors/*.yaml", "sensors/catalogue/*/*.yaml"]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

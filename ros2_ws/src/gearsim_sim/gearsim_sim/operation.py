@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsim_io.errors import InputError
 from gearsim_sim.model.assembly import Vector
-from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.faults.on_site import hangable_sites, paired, site_directions
 from gearsim_sim.model.plant import LOAD, MOTOR, Plant, Track
 from gearsim_sim.model.rotating_force import TIME_TRACK, RotatingForce
 from gearsim_sim.model.side_oscillator import SideOscillator
@@ -51,22 +51,28 @@ class Operation:
         return replace(plant, tracks=(*plant.tracks, *_ripple_tracks(plant, self.profile.ripple)))
 
     def _oscillators(self, plant: Plant) -> dict[str, SideOscillator]:
-        known = fixed_sites(plant)
         found = {}
-        for kind in ("resonances", "paths"):
-            for number, one in enumerate(getattr(self.structure, kind)):
-                ends = one.ends
-                for end in ends:
-                    if end not in known:
-                        expected = "one of " + ", ".join(known)
-                        raise InputError(self.where, f"structure.{kind}.{number}", end, expected)
-                if len(set(ends)) != len(ends):
-                    raise InputError(self.where, f"structure.{kind}.{number}.to", ends[1], "another site")
-                where = tuple(site_vector(plant, end) for end in ends)
-                found[f"{kind}_{number + 1}"] = SideOscillator(
-                    where, one.mass_kg, one.frequency_hz, one.damping_ratio
-                )
+        for number, one in enumerate(self.structure.resonances):
+            where = f"structure.resonances.{number}.site"
+            for axis, direction in enumerate(self._directions(plant, one.site, where)):
+                found[f"resonance_{number + 1}_{axis}"] = one.oscillator((direction,))
+        for number, path in enumerate(self.structure.paths):
+            where = f"structure.paths.{number}"
+            for name, end in (("from", path.from_site), ("to", path.to)):
+                self._directions(plant, end, f"{where}.{name}")
+            try:
+                pairs = paired(plant, path.from_site, path.to)
+            except InputError as error:
+                raise InputError(self.where, f"{where}.to", error.value, error.expected) from None
+            for axis, ends in enumerate(pairs):
+                found[f"path_{number + 1}_{axis}"] = path.oscillator(ends)
         return found
+
+    def _directions(self, plant: Plant, site: str, field: str) -> tuple[Vector, ...]:
+        known = hangable_sites(plant)
+        if site not in known:
+            raise InputError(self.where, field, site, "one of " + ", ".join(known))
+        return site_directions(plant, site)
 
     def course(
         self, plant: Plant, step_s: float, speed_hz: float | None, load_nm: float, seed: int

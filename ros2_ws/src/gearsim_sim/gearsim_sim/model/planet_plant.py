@@ -21,6 +21,7 @@ from gearsim_sim.model.planetary import assemble, rigid_vector
 from gearsim_sim.model.plant import Limits, Plant, RotatingSite, Track
 from gearsim_sim.model.ring import Ring
 from gearsim_sim.model.rolling_bearing import RollingBearing, make_rolling_bearing
+from gearsim_sim.model.shafts import Plane, Shaft
 from gearsim_sim.params.planetary import PlanetaryParams
 
 # Numbers of the first stage's wheels in the random streams, behind those of any planets.
@@ -73,8 +74,23 @@ def make_planetary(params: PlanetaryParams, seed: int) -> PlanetaryPlant:
         gravity_m_per_s2=0.0,
         faults_on=params.physics.faults,
         wheels=planetary_wheels(params, geometry, index),
+        shafts=_shafts(params, index),
         params=params,
         geometry=geometry,
+    )
+
+
+def _shafts(params: PlanetaryParams, index: dict[str, int]) -> tuple[Shaft, ...]:
+    """Sun and carrier, for unbalance; seen from the carrier its own stands still, the sun's runs ahead."""
+    stage, speed = params.stage, params.stage.member_ratios()
+    relative = speed["sun"] / speed["carrier"] - 1
+    sense = math.copysign(1.0, relative)
+    sun = Plane({"x_s": 1.0}, {"y_s": 1.0})
+    carrier = Plane({"x_c": 1.0}, {"y_c": 1.0})
+    rate = sense * speed["sun"] / speed["carrier"]
+    return (
+        Shaft(stage.sun_shaft, index["sun_on_carrier"], rate, sense, {"sun": sun}, {}),
+        Shaft(stage.carrier_shaft, index["carrier_on_carrier"], 1.0, 1.0, {"carrier": carrier}, {}),
     )
 
 
@@ -92,6 +108,7 @@ def _tracks(params: PlanetaryParams, laws: tuple[RollingBearing, ...]) -> tuple[
         Track("sun_on_carrier", abs(speed["sun"] / carrier - 1)),
         Track("ring_on_carrier", abs(speed["ring"] / carrier - 1)),
         Track("planet", abs(spin)),
+        Track("carrier_on_carrier", 0.0),
     ]
     if laws:
         tracks.append(Track("planet counter-clockwise", spin))

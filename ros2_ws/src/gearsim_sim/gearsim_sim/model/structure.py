@@ -30,16 +30,15 @@ class AddedMass(Strict):
     frequency_hz: Annotated[float, Si("Hz", gt=0, le=20000), Field(alias="frequency")]
     damping_ratio: Annotated[float, Si("", ge=0, lt=1)]
 
+    def oscillator(self, where: tuple[Vector, ...]) -> SideOscillator:
+        """On these directions."""
+        return SideOscillator(where, self.mass_kg, self.frequency_hz, self.damping_ratio)
+
 
 class ResonanceModel(AddedMass):
     """A mass on a measuring site."""
 
     site: str
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Where it hangs."""
-        return (self.site,)
 
 
 class PathModel(AddedMass):
@@ -47,11 +46,6 @@ class PathModel(AddedMass):
 
     from_site: Annotated[str, Field(alias="from")]
     to: str
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Where it hangs."""
-        return (self.from_site, self.to)
 
 
 class StructureModel(Strict):

@@ -25,6 +25,7 @@ LEAD_S = 0.25
 _GAP = 10.0  # times the usual interval
 _LEAST_POINTS = 4
 _DEGREE = 5
+_REST_HZ = 1e-9  # what rounding leaves of a rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,11 +158,11 @@ def _led_in(stretches: list[Stretch], step_s: float) -> list[Stretch]:
     first, last = stretches[0], stretches[-1]
     result = list(stretches)
     jet = _jet(first, first.start)
-    if any(jet[1:]):
+    if jet[0] > _REST_HZ and any(jet[1:]):
         steps = _lead_steps(jet, step_s)
         result.insert(0, hermite_stretch(first.start - steps, steps, (jet[0], 0.0, 0.0), jet))
     jet = _jet(last, last.end)
-    if any(jet[1:]):
+    if jet[0] > _REST_HZ and any(jet[1:]):
         steps = _lead_steps(jet, step_s)
         result.append(hermite_stretch(last.end, steps, jet, (jet[0], 0.0, 0.0)))
     return result

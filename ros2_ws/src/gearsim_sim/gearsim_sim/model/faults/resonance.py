@@ -6,7 +6,7 @@ from typing import Annotated
 
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults.kind import FaultKind
-from gearsim_sim.model.faults.on_site import fixed_sites, site_vector
+from gearsim_sim.model.faults.on_site import hangable_sites, site_directions
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.side_oscillator import SideOscillator
 from gearsim_sim.params.fields import SiKeyed, Strict
@@ -22,14 +22,16 @@ class ResonanceParams(Strict):
 
 def place(params: ResonanceParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
     """The oscillator."""
-    where = (site_vector(plant, component),)
-    return (SideOscillator(where, params.mass_kg, params.frequency_hz, params.damping_ratio),)
+    return tuple(
+        SideOscillator((direction,), params.mass_kg, params.frequency_hz, params.damping_ratio)
+        for direction in site_directions(plant, component)
+    )
 
 
 KIND = FaultKind(
     name="resonance",
     summary="a part of the structure that swings at a measuring site",
     params_model=ResonanceParams,
-    components=fixed_sites,
+    components=hangable_sites,
     place=place,
 )

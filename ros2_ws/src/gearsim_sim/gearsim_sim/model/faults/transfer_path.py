@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from gearsim_io.errors import InputError
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults.kind import FaultKind
-from gearsim_sim.model.faults.on_site import fixed_sites, joinable_sites, site_vector
+from gearsim_sim.model.faults.on_site import joinable_sites, paired, partners
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.side_oscillator import SideOscillator
 from gearsim_sim.params.fields import SiKeyed, Strict
@@ -27,14 +26,11 @@ class TransferPathParams(Strict):
 
 def place(params: TransferPathParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
     """The path."""
-    others = [name for name in fixed_sites(plant) if name != component]
-    to = params.to
-    if to is None:
-        to = next((name for name in others if name[-1] == component[-1]), others[0] if others else "")
-    if to not in others:
-        raise InputError(component, "to", to, "another site: one of " + ", ".join(others))
-    where = (site_vector(plant, component), site_vector(plant, to))
-    return (SideOscillator(where, params.mass_kg, params.frequency_hz, params.damping_ratio),)
+    to = partners(plant, component)[0] if params.to is None else params.to
+    return tuple(
+        SideOscillator(ends, params.mass_kg, params.frequency_hz, params.damping_ratio)
+        for ends in paired(plant, component, to)
+    )
 
 
 KIND = FaultKind(
