@@ -22,6 +22,7 @@ from gearsim_sim.model.tooth.stiffness import stiffness_series
 from gearsim_sim.model.tooth.windows import scaled, stretched
 from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.planetary import load_planetary_params
+from gearsim_sim.profile.profile import constant_profile
 from gearsim_sim.schedule import ActiveFault, Schedule, Severity
 from gearsim_sim.stepper import Stepper
 
@@ -137,7 +138,8 @@ def test_random_teeth_follow_the_seed(gearbox):
 
 
 def accelerations(gearbox, faults, oversampling, load_nm=LOAD_NM):
-    schedule = Schedule(gearbox, 1 / (RATE_HZ * oversampling), 0, TURNS, SPEED_HZ, load_nm)
+    course = constant_profile(gearbox, 1 / (RATE_HZ * oversampling), SPEED_HZ, load_nm)
+    schedule = Schedule(gearbox, course, 0, TURNS)
     for name, fault in faults.items():
         schedule.faults[name] = ActiveFault(fault, Severity(1.0, 1.0, 0, 0.0))
     stepper = Stepper(gearbox, schedule, gearbox.sites, oversampling)
