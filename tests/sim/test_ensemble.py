@@ -83,13 +83,14 @@ def kinds(plant):
 def test_every_kind_of_fault_is_that_of_the_engine(params):
     """One variant for each; 0.1 s, in which balls cross pits and all teeth of the pinion mesh."""
     found = list(kinds(make_plant(params, 1)))
-    assert len(found) >= 2
+    assert len(found) > 15
     together = Ensemble([Variant(params, 1, (spec,)) for spec in found], RATE_HZ).advance(6554)
     healthy = Engine(params, 1, RATE_HZ).advance(6554).accel
     for number, spec in enumerate(found):
         alone = Engine(params, 1, RATE_HZ, 4, (spec,)).advance(6554).accel
         assert relative(together.accel[number], alone) < 1e-9, spec.kind
-        assert relative(alone, healthy) > 1e-6, spec.kind  # the fault has been felt
+        # The fault has been felt; under this load teeth never part, so that play between them is not.
+        assert relative(alone, healthy) > 1e-6 or spec.kind == "gear_backlash", spec.kind
 
 
 def test_other_kinds_of_faults_are_refused(params):

@@ -19,6 +19,7 @@ from gearsim_io.errors import InputError
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 from gearsim_sim.ensemble import Ensemble, Variant
 from gearsim_sim.models import parameters
+from gearsim_sim.operation import Operation
 from gearsim_sim.params.overrides import split_quantity
 from gearsim_sim.scenario import FaultModel, Load, Scenario, Speed, load_scenario, scenario_file
 
@@ -133,6 +134,10 @@ def load_ensemble_spec(path: str | Path) -> EnsembleSpec:
     base = load_scenario(beside if beside.is_file() else scenario_file(model.base))
     if not (model.count or model.variants):
         raise InputError(where, "count", 0, "a count of random variants, or variants by hand")
+    plain = Operation()
+    if (base.operation.profile, base.operation.structure) != (plain.profile, plain.structure):
+        expected = "a scenario without profile and structure, which need simulate"
+        raise InputError(where, "base", model.base, expected)
     _check(base, model, where)
     variants = [_drawn(base, model, number, where) for number in range(model.count)]
     variants += [_given(base, one, model.count + k, model.seed) for k, one in enumerate(model.variants)]
