@@ -253,3 +253,19 @@ def test_any_number_of_planets_runs():
     assert plant.planet_names == ("planet_1", "planet_2", "planet_3", "planet_4")
     forces = mesh_forces(plant)
     assert forces[:4].sum() * 0.0375877 == pytest.approx(46.875, rel=1e-5)
+
+
+def test_pitch_point_is_in_single_contact_at_the_sun_and_in_double_contact_at_the_ring():
+    """From Table 7.5: pairs are in contact from -0.857 to 0.778 and from -0.778 to 1.111 base pitches."""
+    plant = make_plant(load_planetary_params(), 1)
+    levels = {}
+    for side, ends in ((SUN, (-0.857, 0.778)), (RING, (-0.778, 1.111))):
+        mesh = plant.meshes[3 * side]
+        pitches = np.arange(200) / 200
+        stiffness = [mesh.stiffness_at(plant.phases((p - mesh.phase_offset) / 80)) for p in pitches]
+        pairs = np.array([sum(ends[0] < p + n < ends[1] for n in (-1, 0, 1)) for p in pitches])
+        levels[side] = np.interp(0.0, pitches, stiffness)
+        middle = (max(stiffness) + min(stiffness)) / 2
+        # All but the places of the hand-over, which the series rounds over 1 / 40 of a pitch.
+        assert np.mean((np.array(stiffness) > middle) == (pairs == 2)) > 0.95
+    assert levels[SUN] < 0.8 * levels[RING]
