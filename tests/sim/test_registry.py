@@ -6,6 +6,7 @@ is a bit more than a turn of the reference shaft, in which everything that turns
 
 import json
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,12 +18,10 @@ from gearsim_sim.engine import Engine
 from gearsim_sim.events import Clear, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.faults import REGISTRY
 from gearsim_sim.scenario import load_scenario
-from gearsim_sim.verify.machines import SEED, machine_of, model_names, params_of, plant_of
+from gearsim_sim.verify.machines import SEED, load_for, machine_of, model_names, params_of, plant_of
 
 RATE_HZ = 4096.0
 KINDS = sorted(REGISTRY)
-# Play between teeth does nothing while the load presses them together; test_gear_faults takes the load away.
-AWAKE = [kind for kind in KINDS if kind != "gear_backlash"]
 
 
 def carriers(kind):
@@ -44,21 +43,17 @@ def stretch(model):
     return math.ceil(RATE_HZ * max(0.1, 1.1 / plant_of(model).limits.speed_hz))
 
 
-def engine(model, faults=(), seed=SEED):
-    return Engine(params_of(model), seed, RATE_HZ, faults=faults)
+def engine(model, faults=(), load_nm=None):
+    return Engine(params_of(model), SEED, RATE_HZ, faults=faults, load_nm=load_nm)
 
 
-_HEALTHY = {}
+@cache
+def healthy(model, load_nm=None):
+    return engine(model, (), load_nm).advance(stretch(model)).accel
 
 
-def healthy(model):
-    if model not in _HEALTHY:
-        _HEALTHY[model] = engine(model).advance(stretch(model)).accel
-    return _HEALTHY[model]
-
-
-def with_faults(model, faults):
-    return engine(model, faults).advance(stretch(model)).accel
+def with_faults(model, faults, load_nm=None):
+    return engine(model, faults, load_nm).advance(stretch(model)).accel
 
 
 def rms(values):
@@ -106,28 +101,30 @@ def test_severity_zero_changes_no_bit_of_another_fault(model):
     assert np.array_equal(with_faults(model, [acting, *others]), with_faults(model, [acting]))
 
 
-@pytest.mark.parametrize("kind", AWAKE)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_small_severity_has_a_small_effect(kind):
     """A hundredth of the severity does at most a tenth of the effect, and the fault does something.
 
     Most effects are in proportion; contact makes some grow with a power of 2/3 and more, 0.01^(2/3) = 0.05.
     """
     for model in carriers(kind):
-        normal = healthy(model)
-        full = rms(with_faults(model, [spec_of(model, kind)]) - normal)
-        small = rms(with_faults(model, [spec_of(model, kind, 0.01)]) - normal)
+        load = load_for(model, kind)
+        normal = healthy(model, load)
+        full = rms(with_faults(model, [spec_of(model, kind)], load) - normal)
+        small = rms(with_faults(model, [spec_of(model, kind, 0.01)], load) - normal)
         assert full > 1e-6 * rms(normal), model
         assert small < 0.1 * full, (model, small, full)
 
 
-@pytest.mark.parametrize("kind", AWAKE)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_fault_grows_during_a_run(kind):
     """Nothing before it is injected, little in the first tenth of its ramp, all of it in the end."""
     model = carriers(kind)[0]
-    running, at = engine(model), 100
+    load = load_for(model, kind)
+    running, at = engine(model, (), load), 100
     ramp_s = 0.5 * stretch(model) / RATE_HZ
     running.inject(spec_of(model, kind), ramp_s, at_sample=at)
-    change = running.advance(stretch(model)).accel - healthy(model)
+    change = running.advance(stretch(model)).accel - healthy(model, load)
     assert not np.any(change[:, : at - running.lookahead_samples])
     soon = at + int(0.1 * ramp_s * RATE_HZ)
     # 10 u^3 - 15 u^4 + 6 u^5 is 0.009 at u = 0.1; the filter looks ahead, contact may take a root of it.

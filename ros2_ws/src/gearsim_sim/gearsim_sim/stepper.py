@@ -126,6 +126,11 @@ class Stepper:
         """Constants of the compiled loop."""
         return self._data
 
+    @property
+    def films(self) -> Array:
+        """Oil films of all bearings, (bearings, balls), in thicknesses under 1 N."""
+        return self._memory.film
+
     def rest(self) -> Rest:
         """Static equilibrium under the load at the present step, with the faults of that step."""
         plant, schedule = self._plant, self._schedule

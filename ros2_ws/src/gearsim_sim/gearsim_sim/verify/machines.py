@@ -15,6 +15,8 @@ from gearsim_sim.models import MODELS
 from gearsim_sim.scenario import Scenario, parse_scenario
 
 SEED = 3
+# Share of the nominal load at which a fault is tried; play between teeth shows where they part.
+LIGHT_LOAD = {"gear_backlash": 0.08}
 
 
 def model_names() -> tuple[str, ...]:
@@ -60,3 +62,8 @@ def _smallest_scenario(model: str, machine: str) -> Scenario:
 def plant_of(model: str) -> Plant:
     """The machine of that model, with the gear errors of `SEED`."""
     return make_plant(params_of(model), SEED)
+
+
+def load_for(model: str, kind: str) -> float:
+    """Load [N m] at which this kind of fault acts: the nominal one but for a few."""
+    return LIGHT_LOAD.get(kind, 1.0) * plant_of(model).limits.load_nm
