@@ -259,6 +259,34 @@ def test_rattling_converges(gearbox):
     assert errors[0] < 0.15
 
 
+def test_force_with_faults_is_the_slope_of_the_energy(gearbox):
+    """On random states in and out of contact, frozen in time; dampers take energy or none."""
+    mesh, rng = gearbox.meshes[0], np.random.default_rng(4)
+    parts = [
+        *build(gearbox, "gear_tooth_crack").contributions,
+        *build(gearbox, "gear_tooth_spall", shape="rectangular").contributions,
+        *build(gearbox, "gear_backlash", backlash_m=1e-5).contributions,
+        *build(gearbox, "gear_misalignment").contributions,
+    ]
+    still, met = np.zeros(gearbox.rates.size), set()
+    for severity in (0.3, 1.0, 2.0):
+        mods = tuple((one, severity) for one in parts)
+        for d in rng.uniform(-6e-5, 6e-5, 60):
+            phases = gearbox.phases(rng.uniform(0, 1))
+            step = 1e-11
+            slope = (mesh.energy(d + step, phases, mods) - mesh.energy(d - step, phases, mods)) / (2 * step)
+            force = mesh.force(d, 0.0, phases, still, mods)
+            assert force == pytest.approx(slope, rel=1e-4, abs=0.1)
+            rate = rng.normal() * 0.01
+            assert (mesh.force(d, rate, phases, still, mods) - force) * rate >= 0
+            tangent = mesh.force(d + step, 0.0, phases, still, mods) - mesh.force(
+                d - step, 0.0, phases, still, mods
+            )
+            assert mesh.tangent(d, phases, mods) == pytest.approx(tangent / (2 * step), rel=1e-3, abs=1e5)
+            met.add(np.sign(force))
+    assert met == {-1.0, 0.0, 1.0}
+
+
 # Contact loss
 
 

@@ -38,8 +38,8 @@ def override(section: Mapping[str, Any], overrides: Mapping[str, Any], where: st
         for part in path:
             place = _inner(place, part, f"parameters.{name}", where)
         old = _inner(place, last, f"parameters.{name}", where)
-        if isinstance(old, str) and isinstance(value, str):
-            place[last] = value  # a choice, such as mesh.stiffness_model
+        if path and isinstance(old, str) and isinstance(value, str):
+            place[last] = value  # a choice, such as mesh.stiffness_model; not the kind of the model
             continue
         if not isinstance(old, dict) or "value" not in old:
             expected = _known(old) if isinstance(old, dict) else "the name of a number of the model"

@@ -13,9 +13,10 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class GearBacklashParams(Strict):
-    """`backlash_m` between drive and back flanks along the line of action."""
+    """Parameters of the play."""
 
     backlash_m: Annotated[float, SiKeyed("m", gt=0, le=5e-3)] = 100e-6
+    """Play between drive and back flanks along the line of action."""
 
 
 def place(

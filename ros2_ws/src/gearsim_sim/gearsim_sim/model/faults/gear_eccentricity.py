@@ -15,10 +15,12 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class GearEccentricityParams(Strict):
-    """`eccentricity_m` between the axes of teeth and shaft; `phase_rad` of the run-out at angle zero."""
+    """Parameters of a gear off its axis."""
 
     eccentricity_m: Annotated[float, SiKeyed("m", gt=0)] = 50e-6
+    """Distance between the axis of the teeth and that of the shaft."""
     phase_rad: Annotated[float, SiKeyed("rad", ge=-2 * math.pi, le=2 * math.pi)] = 0.0
+    """Phase of the run-out at angle zero of the gear."""
 
 
 def place(

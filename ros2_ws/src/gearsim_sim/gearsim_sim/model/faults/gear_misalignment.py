@@ -13,9 +13,10 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class GearMisalignmentParams(Strict):
-    """`angle_rad` between the flanks in the plane of action (thesis: none; 0.5 mrad is 10 um over 20 mm)."""
+    """Parameters of a lead error."""
 
     angle_rad: Annotated[float, SiKeyed("rad", gt=0, le=0.02)] = 0.5e-3
+    """Between the flanks in the plane of action; 0.5 mrad leaves a gap of 10 um over 20 mm of face."""
 
 
 def place(

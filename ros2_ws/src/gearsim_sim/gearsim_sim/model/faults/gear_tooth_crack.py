@@ -15,21 +15,21 @@ from gearsim_sim.params.fields import Count, Fraction, SiKeyed, Strict
 
 
 class GearToothCrackParams(Strict):
-    """Parameters of a root crack.
-
-    `depth_m` is the crack's length from the fillet inwards (default: to the tooth's middle line, as the
-    slot of thesis 7.3.2), `angle_rad` that between crack and middle line (thesis: 45 deg), `width_m` the
-    length along the face where it runs out (default: all along, at one depth), `tooth` counts from 1.
-    `opens` says that the load pulls the crack open; if it presses it shut, the part `closing` of the loss
-    of stiffness is left.
-    """
+    """Parameters of a root crack."""
 
     depth_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Length of the crack from the fillet inwards; by default to the tooth's middle line, as the slot of
+    thesis 7.3.2."""
     angle_rad: Annotated[float, SiKeyed("rad", ge=math.radians(10), le=math.pi / 2)] = math.pi / 4
+    """Between the crack and the middle line of the tooth (thesis: 45 deg)."""
     width_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Length along the face after which the crack has run out; by default it is as deep all along."""
     tooth: Count = 1
+    """Which tooth, from 1; its contact is in the middle at (tooth - 1/2) / teeth turns."""
     opens: bool = True
+    """The load pulls the crack open; if not, it presses it shut."""
     closing: Fraction = 0.3
+    """Part of the loss of stiffness that is left where the load presses the crack shut; 1 for a slot."""
 
 
 def place(

@@ -27,22 +27,23 @@ from gearsim_sim.params.fields import Count, Fraction, SiKeyed, Strict
 
 
 class GearToothSpallParams(Strict):
-    """Parameters of a spall on the drive flank.
-
-    `width_m` along the profile, `depth_m`, `radius_m` of its middle from the gear's axis (default: the pitch
-    circle), `face_fraction` of the face width; all as thesis 7.3.2 by default. `shape` rounded: the other
-    flank rolls over the edges as deep as its curvature lets it; rectangular: down to the floor at once
-    (thesis Figure 7.10). `contact_loss`: part of the contact line that is lost for the Hertz stiffness.
-    `tooth` counts from 1.
-    """
+    """Parameters of a spall on the drive flank; by default that of thesis 7.3.2."""
 
     width_m: Annotated[float, SiKeyed("m", gt=0)] = 1e-3
+    """Length along the profile."""
     depth_m: Annotated[float, SiKeyed("m", gt=0)] = 0.1e-3
+    """Depth of its floor."""
     radius_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Distance of its middle from the gear's axis; by default on the pitch circle."""
     face_fraction: Fraction = 1.0
+    """Part of the face width that it takes."""
     shape: Literal["rounded", "rectangular"] = "rounded"
+    """rounded: the other flank rolls over the edges as deep as its curvature lets it; rectangular: down to
+    the floor at once (thesis Figure 7.10), with exact means of the jumps."""
     contact_loss: Annotated[float, Si("", ge=0, le=0.9)] = 0.0
+    """Part of the contact line that the Hertz stiffness loses while the spall is crossed."""
     tooth: Count = 1
+    """Which tooth, from 1."""
 
 
 def place(

@@ -21,10 +21,12 @@ _STREAM = 11
 
 
 class GearWearParams(Strict):
-    """`depth_m` where the flanks have lost most; `scatter`: standard deviation from tooth to tooth, of it."""
+    """Parameters of worn flanks."""
 
     depth_m: Annotated[float, SiKeyed("m", gt=0)] = 20e-6
+    """Depth where the drive flanks have lost most, near root or tip."""
     scatter: Fraction = 0.1
+    """Standard deviation from tooth to tooth, over the depth; drawn by the seed of the run."""
 
 
 def place(params: GearWearParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:

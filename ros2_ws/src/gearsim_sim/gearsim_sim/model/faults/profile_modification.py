@@ -22,15 +22,18 @@ from gearsim_sim.params.fields import SiKeyed, Strict
 
 
 class ProfileModificationParams(Strict):
-    """`tip_m` and `root_m`: material taken off at the ends of the working flank; `length`: how far that
-    reaches, over the length of double contact (1: long, 0.5: short relief); `power` 1: straight, 2:
-    parabolic; `load_nm`: load torque at which pairs share the force (default: that of the start)."""
+    """Parameters of tip and root relief."""
 
     tip_m: Annotated[float, SiKeyed("m", ge=0, le=1e-3)] = 10e-6
+    """Material taken off at the tip end of the working flank."""
     root_m: Annotated[float, SiKeyed("m", ge=0, le=1e-3)] = 0.0
+    """Material taken off at its root end."""
     length: Annotated[float, Si("", gt=0, le=1)] = 0.5
+    """How far the relief reaches, over the length of double contact; 1: long, 0.5: short relief."""
     power: Annotated[float, Si("", ge=1, le=4)] = 1.0
+    """1: straight, 2: parabolic from where it begins."""
     load_nm: Annotated[float, SiKeyed("N*m", gt=0)] | None = None
+    """Load torque at which the pairs share the force; by default that of the start."""
 
 
 def place(

@@ -17,12 +17,14 @@ _STREAM = 12
 
 
 class ToothPitchErrorParams(Strict):
-    """`error_m` of one tooth (positive presses the teeth together), `tooth` counted from 1; and `rms_m` of
-    random errors of all teeth, drawn by the seed of the run."""
+    """Parameters of teeth that stand early or late."""
 
     error_m: Annotated[float, SiKeyed("m", ge=-1e-3, le=1e-3)] = 10e-6
+    """Error of one tooth along the line of action; positive presses the teeth together."""
     tooth: Count = 1
+    """Which tooth, from 1."""
     rms_m: Annotated[float, SiKeyed("m", ge=0, le=1e-3)] = 0.0
+    """Standard deviation of random errors of all teeth, drawn by the seed of the run."""
 
 
 def place(params: ToothPitchErrorParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:
