@@ -25,7 +25,8 @@ from gearsim_sim.model.plant import BASE_INPUTS, Limits, Plant, StateRow, Track
 from gearsim_sim.model.ring import Ring
 from gearsim_sim.model.shaft import bending_link, torsion_link
 from gearsim_sim.model.tooth.pair import GearPair
-from gearsim_sim.params.parallel import BEARINGS, ParallelModel, ParallelParams, TorsionalEnd
+from gearsim_sim.params.parallel import BEARINGS, ParallelModel, ParallelParams
+from gearsim_sim.params.parts import TorsionalEnd
 
 INPUT, OUTPUT = 0, 1
 BEARING_SHAFT = (INPUT, INPUT, OUTPUT, OUTPUT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gearsim_sim.model.assembly import Assembly
-from gearsim_sim.params.parallel import Pedestal
+from gearsim_sim.params.parts import Pedestal
 
 
 def add_pedestal(

@@ -20,7 +20,7 @@ from gearsim_io.quantities import Si, validate
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Strict
 from gearsim_sim.params.overrides import override
-from gearsim_sim.params.parallel import Drive, Pedestal, Seat
+from gearsim_sim.params.parts import Drive, Pedestal, Seat
 
 MODEL_KIND = "bearing_rig"
 Dofs = Literal[2, 4, 5]
@@ -36,24 +36,24 @@ class RigPhysics(Strict):
 
 
 class BearingRigModel(Strict):
-    """The `model` section.
-
-    `shaft` is what of the shaft moves with the inner ring, and the damper of the bearing; `radial_load` is
-    a standing force on it beside its weight. `sites` tells the direction of each channel: of the pedestal,
-    or of the inner ring where there is no pedestal.
-    """
+    """The `model` section."""
 
     kind: Literal["bearing_rig"]
     drive: Drive
     shaft: Seat
+    """What of the shaft moves with the inner ring, and the damper of the bearing."""
     radial_load_n: Annotated[float, Si("N", ge=0), Field(alias="radial_load")]
+    """Standing force on the shaft beside its weight."""
     load_direction_rad: Annotated[
         float, Si("rad", ge=-2 * math.pi, le=2 * math.pi), Field(alias="load_direction")
     ]
+    """Where it presses the inner ring to, from x counter-clockwise."""
     bearing: RollingBearing
     pedestal: Pedestal
     sites: dict[str, Literal["x", "y"]] = Field(min_length=1)
+    """Direction of each channel: of the pedestal, or of the inner ring where there is no pedestal."""
     gravity_m_per_s2: Annotated[float, Si("m/s^2", gt=0), Field(alias="gravity")]
+    """Against y."""
 
 
 class BearingRigParams(Strict):

@@ -24,6 +24,7 @@ from gearsim_sim.model.tooth.stiffness import pair_compliance
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
+from gearsim_sim.params.parts import Drive, Gear, Pedestal, Seat, Shafts, TorsionalEnd
 from gearsim_sim.params.teeth import Teeth
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
@@ -35,41 +36,11 @@ _PRESSURE_ANGLES_RAD = (math.radians(10), math.radians(35))
 _SAME_RADIUS = 1e-3
 
 
-class TorsionalEnd(Strict):
-    """A flywheel or an encoder at the end of a shaft, behind a torsion spring and damper."""
-
-    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
-    stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="stiffness")]
-    damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="damping")]
-
-
-class Gear(Strict):
-    """A gear wheel, lumped."""
-
-    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
-    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
-    base_radius_m: Annotated[float, Si("m", gt=0), Field(alias="base_radius")]
-
-
-class Seat(Strict):
-    """The part of a shaft lumped at a bearing, and the damper of that bearing."""
-
-    inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="inertia")]
-    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
-    damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
-
-
 class GearboxSeat(Seat):
-    """A seat of the gearbox; `bearing` changes numbers of the section `ball_bearing` for this one."""
+    """A seat of the gearbox."""
 
     bearing: RollingBearing | None = None
-
-
-class Shafts(Strict):
-    """Stiffness of each shaft half, from gear to bearing."""
-
-    torsional_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="torsional_stiffness")]
-    bending_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="bending_stiffness")]
+    """Numbers of the section `ball_bearing` that are different for this one."""
 
 
 class MeshStiffness(Strict):
@@ -95,39 +66,26 @@ class MeshStiffness(Strict):
     centre_distance_m: Annotated[Annotated[float, Si("m", gt=0)] | None, Field(alias="centre_distance")] = (
         None
     )
+    """Distance of the axes, if it is to be checked against the teeth."""
 
 
 class GearErrors(Strict):
     """Transmission error of each gear, added along the line of action."""
 
     runout_m: Annotated[float, Si("m", ge=0), Field(alias="runout")]
+    """Amplitude once per turn of each gear, (4.15)."""
     profile_m: Annotated[float, Si("m", ge=0), Field(alias="profile")]
+    """Amplitude at the tooth mesh, (4.16)."""
     pinion_phase_rad: Annotated[float, Si("rad"), Field(alias="pinion_phase")]
+    """Of run-out and profile of the pinion."""
     gear_phase_rad: Annotated[float, Si("rad"), Field(alias="gear_phase")]
+    """Of run-out and profile of the gear."""
     pitch_rms_m: Annotated[float, Si("m", ge=0), Field(alias="pitch_rms")]
+    """Of the random errors of the single teeth."""
     surface_rms_m: Annotated[float, Si("m", ge=0), Field(alias="surface_rms")]
+    """Of the random surface."""
     harmonics: Count
-
-
-class Pedestal(Strict):
-    """A bearing pedestal: a mass on springs, carrying a small mass that stands for a high resonance."""
-
-    mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="mass")]
-    stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="stiffness")]
-    damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="damping")]
-    resonator_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="resonator_mass")]
-    resonator_frequency_hz: Annotated[float, Si("Hz", gt=0), Field(alias="resonator_frequency")]
-    resonator_damping_ratio: Annotated[float, Si("", ge=0, lt=1)]
-
-
-class Drive(Strict):
-    """Operating point at the start, and its limits."""
-
-    speed_hz: Annotated[float, Si("Hz", ge=0), Field(alias="speed")]
-    load_nm: Annotated[float, Si("N*m", ge=0), Field(alias="load")]
-    speed_limit_hz: Annotated[float, Si("Hz", gt=0), Field(alias="speed_limit")]
-    load_limit_nm: Annotated[float, Si("N*m", gt=0), Field(alias="load_limit")]
-    acceleration_torque_nm: Annotated[float, Si("N*m", gt=0), Field(alias="acceleration_torque")]
+    """Pitch and surface errors reach this multiple of the tooth mesh order."""
 
 
 class Physics(Strict):

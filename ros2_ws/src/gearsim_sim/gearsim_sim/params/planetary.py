@@ -20,7 +20,7 @@ from gearsim_io.quantities import Si, validate
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
 from gearsim_sim.params.overrides import override
-from gearsim_sim.params.parallel import Drive
+from gearsim_sim.params.parts import Drive
 
 MODEL_KIND = "planetary"
 
