@@ -141,15 +141,17 @@ def test_portions_change_no_bit(variants, together):
 
 
 def test_events_of_one_variant_are_those_of_the_engine_and_leave_the_others_alone(params):
-    """A ramp, a fault that grows and goes; the other variant keeps its bits."""
+    """A ramp, a fault that grows and goes, asked for on the way; the other variant keeps its bits."""
     plain = [Variant(params, 5), Variant(params, 6)]
     moved, still = Ensemble(plain, RATE_HZ), Ensemble(plain, RATE_HZ)
     engine = Engine(params, 5, RATE_HZ)
     for run in (moved, engine):
+        run.advance(50)
         own = (0,) if run is moved else ()
         run.set_operating_point(*own, 14.0, 80.0, ramp_s=0.05, at_sample=200)
         run.inject(*own, OUTER, ramp_s=0.02, at_sample=1000)
         run.clear(*own, "outer", ramp_s=0.01, at_sample=5000)
+    still.advance(50)
     found, quiet, expected = moved.advance(8000), still.advance(8000), engine.advance(8000)
     assert relative(found.accel[0], expected.accel) < 1e-9
     assert relative(found.speed_hz[0], expected.speed_hz) < 1e-12

@@ -123,7 +123,7 @@ def pack_drive(
     drives: Sequence[Drive], elements: LaneElements, memory: LaneMemory, variants: int
 ) -> LaneDrive:
     """Operating points, angles and fault rows of all lanes, of which the first `variants` are real."""
-    rows = {name: [_felt(getattr(drive, name)) for drive in drives] for name in TABLES}
+    rows = {name: [getattr(drive, name) for drive in drives] for name in TABLES}
     offsets = np.cumsum([1, *(drive.samples.size for drive in drives)])
     pitted, ill_bearings, ill_meshes = [], [], []
     for lane in range(variants):
@@ -148,11 +148,6 @@ def pack_drive(
         **{name: _table(name, rows[name], offsets) for name in TABLES},
         samples=np.concatenate([np.zeros(1), *(drive.samples for drive in drives)]),
     )
-
-
-def _felt(rows: Array) -> Array:
-    """Rows whose severity is not zero for good: only these may change a bit."""
-    return rows[np.any(rows[:, :2] != 0.0, axis=1)]
 
 
 def _needs_single_bearings(
