@@ -7,6 +7,7 @@ import pytest
 
 from gearsim_sim.engine import Engine
 from gearsim_sim.events import FaultSpec
+from gearsim_sim.model.bearing_loop import ninth_root
 from gearsim_sim.model.faults import of_bearings
 from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.bearing import Element
@@ -113,6 +114,12 @@ def test_warm_oil_softens_roughness_more_than_spalls(params, fault, least_db, mo
         pair = [run(params, [*others, *more], 16384).accel[5] for more in ([fault], [])]
         added.append(band(pair[0] - pair[1], 10e3, 20e3))
     assert least_db < 20 * math.log10(added[0] / added[1]) < most_db
+
+
+def test_ninth_root():
+    x = np.geomspace(1e-12, 1e-2, 400)
+    assert np.array([ninth_root.py_func(value) for value in x]) == pytest.approx(x ** (1 / 9), rel=1e-12)
+    assert ninth_root.py_func(0.0) < 1e-3
 
 
 def test_roller_bearings_run(params):

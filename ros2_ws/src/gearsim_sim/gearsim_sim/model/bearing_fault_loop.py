@@ -134,10 +134,10 @@ def enter_terms(
 
 
 @inlined
-def turn_balls(b: int, bearings: Bearings, memory: BearingMemory, now: Array) -> None:
+def turn_balls(b: int, bearings: Bearings, memory: BearingMemory) -> None:
     """Cosines and sines of the balls with their play in the pockets."""
     for j in range(memory.play.shape[1]):
-        d = TWO_PI * memory.play[b, j] if now[b, PLAY] != 0.0 else 0.0
+        d = TWO_PI * memory.play[b, j]
         square = d * d
         c = 1.0 - square * (0.5 - square * (1.0 / 24.0))
         s = d * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)))

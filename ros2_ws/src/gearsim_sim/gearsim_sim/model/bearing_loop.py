@@ -79,6 +79,23 @@ def film_thickness(gap: float, before: float, factor: float, unit: float, dampin
 
 
 @inlined
+def ninth_root(x: float) -> float:
+    """x^(1/9), to 1e-12 from 1e-12 to 1e-2, without a branch: for compressions of rollers in m.
+
+    The eighth root of x in tens of micrometres is off by 20 % at most; four steps of Halley's method each
+    leave 20/3 of the third power of the error.
+    """
+    t = x * 1e5 + 1e-30  # not zero, where no compression is left
+    y = math.sqrt(math.sqrt(math.sqrt(t)))
+    for _ in range(4):
+        cube = y * y * y
+        ninth = cube * cube * cube
+        y *= (8.0 * ninth + 10.0 * t) / (10.0 * ninth + 8.0 * t)
+    root: float = y * 0.2782559402207124  # (1e-5)^(1/9)
+    return root
+
+
+@inlined
 def roller_film_thickness(gap: float, before: float, factor: float, unit: float, damping: float) -> float:
     """The same of a roller."""
     z = before
@@ -89,7 +106,7 @@ def roller_film_thickness(gap: float, before: float, factor: float, unit: float,
         carried = fifth * fifth
         elastic = gap + unit * z
         elastic = elastic if elastic > 0.0 else 0.0
-        slope = factor * elastic ** (1.0 / 9.0)
+        slope = factor * ninth_root(elastic)
         rest = damping * (1.0 - before * inverse) + slope * elastic - carried
         growth = damping * before * square + 10.0 / 9.0 * slope * unit + 10.0 * carried * inverse
         z = limited(z, rest / growth)
@@ -127,27 +144,42 @@ def film_ball_forces(
 
 
 @apart
-def roller_forces(
+def film_roller_forces(
     along: float, across: float, clearance: float, b: int, factor: float, memory: BearingMemory, now: Array,
     step_s: float, balls: int,
 ) -> tuple[float, float]:  # fmt: skip
-    """Sum of gap^(10/9) over the rollers in contact, in the frame of the cage; oil films as with balls."""
+    """The same of rollers."""
     unit, squeeze = now[b, FILM], now[b, SQUEEZE_ROOT] / step_s
     fx = 0.0
     fy = 0.0
     for j in range(balls):
         cj, sj = memory.cosines[b, j], memory.sines[b, j]
         gap = along * cj + across * sj - clearance - memory.missing[b, j]
-        if unit > 0.0:
-            before = memory.film[b, j]
-            damping = squeeze / math.sqrt(unit * before)
-            z = roller_film_thickness(gap, before, factor, unit, damping)
-            memory.film[b, j] = z
-            gap += unit * z
-        if gap > 0.0:
-            force = gap ** (10.0 / 9.0)
-            fx += force * cj
-            fy += force * sj
+        before = memory.film[b, j]
+        z = roller_film_thickness(gap, before, factor, unit, squeeze / math.sqrt(unit * before))
+        memory.film[b, j] = z
+        gap += unit * z
+        gap = gap if gap > 0.0 else 0.0
+        force = gap * ninth_root(gap)
+        fx += force * cj
+        fy += force * sj
+    return fx, fy
+
+
+@apart
+def roller_forces(
+    along: float, across: float, clearance: float, b: int, memory: BearingMemory, balls: int
+) -> tuple[float, float]:
+    """Sum of gap^(10/9) over the rollers in contact, in the frame of the cage."""
+    fx = 0.0
+    fy = 0.0
+    for j in range(balls):
+        cj, sj = memory.cosines[b, j], memory.sines[b, j]
+        gap = along * cj + across * sj - clearance - memory.missing[b, j]
+        gap = gap if gap > 0.0 else 0.0
+        force = gap * ninth_root(gap)
+        fx += force * cj
+        fy += force * sj
     return fx, fy
 
 
@@ -157,10 +189,13 @@ def other_forces(
     now: Array, step_s: float, balls: int,
 ) -> tuple[float, float]:  # fmt: skip
     """The same for rollers, for balls out of the middle of their pockets, and with oil films."""
-    turn_balls(b, bearings, memory, now)
+    if now[b, PLAY] != 0.0:
+        turn_balls(b, bearings, memory)
     factor = bearings.numbers[b, 0]
+    if bearings.rollers[b] != 0 and now[b, FILM] > 0.0:
+        return film_roller_forces(along, across, clearance, b, factor, memory, now, step_s, balls)
     if bearings.rollers[b] != 0:
-        return roller_forces(along, across, clearance, b, factor, memory, now, step_s, balls)
+        return roller_forces(along, across, clearance, b, memory, balls)
     if now[b, FILM] > 0.0:
         return film_ball_forces(along, across, clearance, b, factor, memory, now, step_s, balls)
     fx = 0.0

@@ -45,10 +45,17 @@ def bearing_data(plant: Plant, place: NDArray[np.int64]) -> Bearings:
 def bearing_memory(bearings: Bearings) -> BearingMemory:
     """Bearings that have not moved yet; films begin as under 100 N."""
     shape = bearings.cosines.shape
-    missing, play, cosines, sines, film = np.zeros((5, *shape))
+    missing, play, film = np.zeros((3, *shape))
     for i in range(shape[0]):
         film[i] = 100.0 ** (-1 / (LINE_LOAD_POWER if bearings.rollers[i] else POINT_LOAD_POWER))
-    return BearingMemory(missing, play, cosines, sines, film, np.zeros((shape[0], CAGE_COLUMNS)))
+    return BearingMemory(
+        missing=missing,
+        play=play,
+        cosines=bearings.cosines.copy(),
+        sines=bearings.sines.copy(),
+        film=film,
+        cage=np.zeros((shape[0], CAGE_COLUMNS)),
+    )
 
 
 def mesh_data(plant: Plant, place: NDArray[np.int64], step_s: float) -> Meshes:

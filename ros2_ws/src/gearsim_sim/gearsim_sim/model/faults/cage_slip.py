@@ -25,7 +25,7 @@ class CageSlipParams(Strict):
     """Radial force that halves the slip; by default it does not depend on the load."""
     jitter_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.5)] = 0.01
     """Greatest angle by which the cage runs ahead or behind at random."""
-    pocket_play_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.1)] = 0.005
+    pocket_play_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.5)] = 0.005
     """Greatest angle, seen from the bearing's axis, of an element out of the middle of its pocket."""
     knot_turns: Annotated[float, SiKeyed("", gt=0, le=100)] = 0.3
     """Turns of the cage from one random angle to the next."""
@@ -35,7 +35,11 @@ class CageSlipParams(Strict):
 
 def place(params: CageSlipParams, component: str, plant: Plant, seed: int) -> tuple[BearingTerm, ...]:
     """Slip, jitter of the cage, and play of the elements, each if there is any."""
-    index, _ = find_seat(plant, component)
+    index, seat = find_seat(plant, component)
+    limit = 0.25 * seat.law.ball_spacing_rad
+    if params.pocket_play_rad > limit:
+        expected = f"at most {limit:.3g} rad, a quarter of the spacing"
+        raise InputError(component, "pocket_play_rad", params.pocket_play_rad, expected)
     knots = 1 / params.knot_turns
     terms = []
     if params.slip > 0:
