@@ -104,7 +104,7 @@ class LoadNoiseModel(Strict):
 
     rms: Annotated[float, Si("N*m", gt=0)]
     low: Annotated[float, Si("Hz", ge=0)] = 0.0
-    high: Annotated[float, Si("Hz", gt=0, le=1000)]
+    high: Annotated[float, Si("Hz", gt=0, le=200)]
 
 
 class ProfileModel(Strict):
