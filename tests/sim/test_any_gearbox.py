@@ -59,6 +59,7 @@ def test_each_bearing_has_its_own_numbers(params):
     assert [law.rows for law in laws] == [1, 1, 1, 2]
     assert [law.ball_count for law in laws] == [13, 9, 9, 24]
     assert [law.clearance_m for law in laws] == pytest.approx([4e-6, 3e-6, 3e-6, 5e-6])
+    assert plant.sites["b3_y"] == {"y_p3": 1.0}
     stiffness = plant.system.stiffness
     for number, own in enumerate((3e8, 8e7, 8e7, 1.2e8), 1):
         shaft, pedestal = plant.system.dof(f"y_s{number}"), plant.system.dof(f"y_p{number}")
@@ -87,6 +88,19 @@ def test_frequencies_of_shafts_and_mesh(healthy):
         found, height = strongest(spectrum, expected)
         assert abs(found - expected) <= BIN_HZ
         assert height > 20
+
+
+def test_teeth_in_contact_change_with_the_pinion(params):
+    """Without any error of the teeth, their stiffness alone is heard: at the tooth mesh and its multiples."""
+    off = dict.fromkeys(("runout", "tooth_profile", "tooth_pitch", "tooth_surface", "ball_passing"), False)
+    engine = Engine(params.with_physics(**off), 1, RATE_HZ, sites={"b2_y": {"y_p2": 1.0}})
+    x = engine.advance(round(SECONDS * RATE_HZ)).accel[0]
+    spectrum = np.abs(np.fft.rfft(x * np.hanning(x.size)))
+    mesh = 19 * SPEED_HZ
+    found, height = strongest(spectrum, mesh, reach_hz=400.0)
+    assert abs(found - mesh) <= BIN_HZ
+    assert height > 1e6  # nothing else between 75 and 875 Hz but the ends of the window
+    assert round(np.argmax(spectrum) * BIN_HZ / mesh, 3) % 1 == 0
 
 
 def test_both_shafts_turn_as_the_teeth_say(healthy):

@@ -96,6 +96,8 @@ def test_matrices_are_the_first_22_rows(plant):
         assert np.abs(ours - theirs[:N, :N]).max() <= 1e-12 * np.abs(theirs[:N, :N]).max()
     assert np.abs(system.interfaces - interfaces[:N]).max() <= 1e-15
     assert system.inputs[:, 2] == pytest.approx(weight[:N])
+    assert plant.sites["b3_y"] == {"y_s3": 1.0}
+    assert not plant.mounts  # nothing that could get loose
 
 
 def test_statics_are_those_of_rigid_pedestals(plant):
