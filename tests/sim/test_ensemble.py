@@ -19,7 +19,7 @@ from gearsim_sim.integrate.vectors import LANES
 from gearsim_sim.lane_tables import TABLES
 from gearsim_sim.model.faults import REGISTRY
 from gearsim_sim.model.plants import make_plant
-from gearsim_sim.params import load_parallel_params
+from gearsim_sim.params import load_parallel_params, load_planetary_params
 
 RATE_HZ = 65536.0
 HALF_SECOND = 32768
@@ -174,6 +174,16 @@ def test_sites_and_rates_are_those_of_the_engine(params):
     expected = Engine(params, 1, 30000.0, 6, sites=sites).advance(3000)
     assert found.site_names == ("up", "across")
     assert relative(found.accel[0], expected.accel) < 1e-9
+
+
+def test_other_machines_are_those_of_the_engine_too():
+    """The planetary stage has no rolling bearings, and sensors that turn with the carrier."""
+    params = load_planetary_params()
+    found = Ensemble([Variant(params, 1), Variant(params, 2, speed_hz=2.0)], RATE_HZ).advance(3000)
+    for number, speed_hz in enumerate((None, 2.0)):
+        expected = Engine(params, number + 1, RATE_HZ, speed_hz=speed_hz).advance(3000)
+        assert found.site_names == expected.site_names
+        assert relative(found.accel[number], expected.accel) < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def rows_of(lane: int, drive: LaneDrive, work: LaneWork) -> Any:
 def place_lane_spalls(step: int, elements: LaneElements, drive: LaneDrive, work: LaneWork) -> int:
     """Enter what pits take away into `work.missing`; returns how many `work.marks` say where."""
     bearings = elements.bearings
-    balls = elements.cosines.size // bearings.index.shape[0]
+    balls = elements.cosines.size // max(bearings.index.shape[0], 1)
     marks = 0
     for k in range(drive.pitted.size):
         lane = drive.pitted[k]
