@@ -45,7 +45,9 @@ class OperatingPointModel(Strict):
     """
 
     speed: Speed | None = None
+    """Speed of the reference shaft at the start; under a law of torques that to be reached."""
     load: Load
+    """Load torque at the start."""
 
 
 class FaultModel(Strict):

@@ -27,8 +27,11 @@ class AddedMass(Strict):
     """A mass that swings: its frequency where its ends are held, and its damping."""
 
     mass_kg: Annotated[float, Si("kg", gt=0, le=1000), Field(alias="mass")]
+    """Mass that swings."""
     frequency_hz: Annotated[float, Si("Hz", gt=0, le=20000), Field(alias="frequency")]
+    """Its natural frequency where its ends are held."""
     damping_ratio: Annotated[float, Si("", ge=0, lt=1)]
+    """Its damping over the critical one."""
 
     def oscillator(self, where: tuple[Vector, ...]) -> SideOscillator:
         """On these directions."""
@@ -39,13 +42,16 @@ class ResonanceModel(AddedMass):
     """A mass on a measuring site."""
 
     site: str
+    """Measuring site that it hangs on."""
 
 
 class PathModel(AddedMass):
     """A mass between two measuring sites; below its frequency a spring of m w^2 / 4."""
 
     from_site: Annotated[str, Field(alias="from")]
+    """Measuring site where the path begins."""
     to: str
+    """Measuring site where it ends."""
 
 
 class StructureModel(Strict):

@@ -18,35 +18,50 @@ class TraceModel(Strict):
     """A measured speed (and load) over time: columns of a CSV file, or arrays of an npz file."""
 
     file: str = Field(min_length=1)
+    """CSV file with a header, or npz file, beside the scenario."""
     time: str = "time_s"
+    """Column of the time in seconds, from 0 on."""
     speed: str = "speed_hz"
+    """Column of the speed of the reference shaft."""
     speed_unit: Literal["Hz", "rpm"] = "Hz"
-    load: str | None = None  # column; without it the load of the operating point
-    tolerance: Annotated[float, Si("Hz", ge=0)] = 0.0  # rms distance that a smoother curve may have
+    """Unit of that column."""
+    load: str | None = None
+    """Column of the load torque in N m; without it the load of the operating point."""
+    tolerance: Annotated[float, Si("Hz", ge=0)] = 0.0
+    """Rms distance from the points that a smoother curve of speed may have."""
     load_tolerance: Annotated[float, Si("N*m", ge=0)] = 0.0
-    max_gap: Seconds | None = None  # without it ten times the usual interval
+    """The same for the load."""
+    max_gap: Seconds | None = None
+    """Longest time without a point; without it ten times the usual interval."""
 
 
 class CurvePointModel(Strict):
     """A point of a motor's torque over speed."""
 
     speed: SpeedHz
+    """Speed of the reference shaft."""
     torque: Annotated[float, Si("N*m", ge=-1e6, le=1e6)]
+    """Torque of the motor there."""
 
 
 class ControllerModel(Strict):
     """A PI speed controller that leads the motor to the speed of the operating point."""
 
     gain: Annotated[float, Si("N*m/Hz", gt=0)]
+    """Torque per difference of speed."""
     integral_time: Seconds
+    """Time in which a lasting difference adds as much torque again."""
     limit: Annotated[float, Si("N*m", gt=0, le=1e6)]
-    ramp: Seconds = 1.0  # within which its target rises from the speed at the start
+    """Greatest torque that the motor gives."""
+    ramp: Seconds = 1.0
+    """Time in which the wanted speed rises from that at the start to the operating point's."""
 
 
 class MotorModel(Strict):
     """One of: a constant torque, a curve of torque over speed, a controlled motor."""
 
     constant: Annotated[float, Si("N*m", gt=0, le=1e6)] | None = None
+    """Torque at any speed."""
     curve: Annotated[tuple[CurvePointModel, ...], Field(min_length=2)] | None = None
     controller: ControllerModel | None = None
 
@@ -65,8 +80,11 @@ class LoadLawModel(Strict):
     """How the load depends on speed: shares of the load at the speed of the operating point."""
 
     constant: Annotated[float, Si("", ge=0, le=1)] = 0.0
+    """Share of the load that any speed has."""
     linear: Annotated[float, Si("", ge=0, le=1)] = 0.0
+    """Share that grows with the speed."""
     quadratic: Annotated[float, Si("", ge=0, le=1)] = 0.0
+    """Share that grows with the square of the speed."""
 
     @model_validator(mode="after")
     def _whole(self) -> LoadLawModel:
@@ -80,17 +98,24 @@ class TorquesModel(Strict):
 
     motor: MotorModel
     start_speed: SpeedHz = 0.0
-    takeover: Annotated[float, Si("s", ge=0.01, le=100)] = 0.1  # the torques come on within this time
+    """Speed at the start; 0 is a run-up from rest."""
+    takeover: Annotated[float, Si("s", ge=0.01, le=100)] = 0.1
+    """Time in which the torques come on at the start."""
 
 
 class RippleModel(Strict):
     """A torque that oscillates with the angle of a shaft (`order`) or in time (`frequency`)."""
 
     at: Literal["motor", "load"]
+    """The torque that pulsates."""
     order: Annotated[float, Si("", gt=0, le=1000)] | None = None
+    """Periods per turn of the shaft that it acts on."""
     frequency: Annotated[float, Si("Hz", ge=1)] | None = None
+    """Fixed frequency, in place of an order."""
     amplitude: Torque
+    """Amplitude of the torque."""
     phase: Annotated[float, Si("rad")] = 0.0
+    """Phase of the cosine at the shaft's angle zero, or at time zero."""
 
     @model_validator(mode="after")
     def _just_one(self) -> RippleModel:
@@ -103,8 +128,11 @@ class LoadNoiseModel(Strict):
     """A band-limited random load on top."""
 
     rms: Annotated[float, Si("N*m", gt=0)]
+    """Standard deviation of the random load."""
     low: Annotated[float, Si("Hz", ge=0)] = 0.0
+    """Lower edge of its band."""
     high: Annotated[float, Si("Hz", gt=0, le=200)]
+    """Upper edge of its band."""
 
 
 class ProfileModel(Strict):

@@ -24,9 +24,13 @@ class LoosenessParams(Strict):
     """
 
     reduction: Annotated[float, SiKeyed("", ge=0, le=0.95)] = 0.6
+    """Share of the base's stiffness that is missing while the foot lifts."""
     gap_m: Annotated[float, SiKeyed("m", gt=0, le=1e-2)] = 50e-6
+    """Lift at which the bolt's head stops it."""
     clamp_n: Annotated[float, SiKeyed("N", ge=-1e6, le=1e6)] | None = None
-    rounding_m: Annotated[float, SiKeyed("m", gt=0, le=1e-4)] = 0.1e-6  # asperities of the joint
+    """Lifting force at which the joint opens; without it the static one at nominal load."""
+    rounding_m: Annotated[float, SiKeyed("m", gt=0, le=1e-4)] = 0.1e-6
+    """Half width of the rounded corners of the force: asperities of the joint."""
 
 
 def components(plant: Plant) -> tuple[str, ...]:

@@ -16,8 +16,11 @@ class ResonanceParams(Strict):
     """The mass that swings, its frequency on a held base, and its damping."""
 
     mass_kg: Annotated[float, SiKeyed("kg", gt=0, le=1000)] = 0.5
+    """Mass that swings."""
     frequency_hz: Annotated[float, SiKeyed("Hz", gt=0, le=20000)] = 3000.0
+    """Its natural frequency on a held base."""
     damping_ratio: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.02
+    """Its damping over the critical one."""
 
 
 def place(params: ResonanceParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001

@@ -24,7 +24,9 @@ class ShaftBowParams(Strict):
     """Distance of the wheel's centre from the line of the bearings, and its direction."""
 
     bow_m: Annotated[float, SiKeyed("m", ge=0, le=1e-2)] = 50e-6
+    """Distance of the wheel's centre from the line of the bearings, free of force."""
     phase_rad: Annotated[float, SiKeyed("rad", ge=-2 * math.pi, le=2 * math.pi)] = 0.0
+    """Its direction at the shaft's angle zero."""
 
 
 def place(params: ShaftBowParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001

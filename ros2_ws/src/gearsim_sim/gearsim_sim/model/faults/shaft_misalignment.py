@@ -33,14 +33,22 @@ class ShaftMisalignmentParams(Strict):
     """How far and in which direction the shafts are out of line, and the coupling between them."""
 
     offset_m: Annotated[float, SiKeyed("m", ge=0, le=5e-3)] = 0.2e-3
+    """Parallel offset of the shafts."""
     angle_rad: Annotated[float, SiKeyed("rad", ge=0, le=0.2)] = 0.01
+    """Angle between the shafts."""
     direction_rad: Annotated[float, SiKeyed("rad", ge=-2 * math.pi, le=2 * math.pi)] = math.pi / 2
+    """Direction of both, from x towards y."""
     # A jaw coupling of its size; one jaw's cushion is worn.
     elements: Count = 3
+    """Elastic elements of the coupling, 2 to 12."""
     radius_m: Annotated[float, SiKeyed("m", gt=0, le=1)] = 0.03
+    """Radius of the elements' circle."""
     element_stiffness_n_per_m: Annotated[float, SiKeyed("N/m", gt=0, le=1e9)] = 2e6
-    unevenness: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.1  # the first element is softer by this share
+    """Tangential stiffness of an element."""
+    unevenness: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.1
+    """By how much the first element is softer, as a share."""
     overhang_ratio: Annotated[float, SiKeyed("", ge=0, le=2)] = 0.3
+    """Distance of the coupling from the near bearing over that of the bearings."""
 
 
 def place(

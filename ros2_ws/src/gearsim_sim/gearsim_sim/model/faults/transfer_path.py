@@ -19,9 +19,13 @@ class TransferPathParams(Strict):
     """
 
     to: str | None = None
+    """Measuring site at the other end; without it the next one in the same direction."""
     mass_kg: Annotated[float, SiKeyed("kg", gt=0, le=1000)] = 0.5
+    """Mass in the middle of the path."""
     frequency_hz: Annotated[float, SiKeyed("Hz", gt=0, le=20000)] = 1000.0
+    """Its natural frequency with both ends held."""
     damping_ratio: Annotated[float, SiKeyed("", ge=0, lt=1)] = 0.05
+    """Its damping over the critical one."""
 
 
 def place(params: TransferPathParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001

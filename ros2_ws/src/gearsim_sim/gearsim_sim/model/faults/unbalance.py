@@ -18,8 +18,11 @@ class UnbalanceParams(Strict):
 
     # A rotor of 10 kg with its centre of mass 1 mm out of line; balancing to G 6.3 at 10 Hz allows a tenth.
     unbalance_kg_m: Annotated[float, SiKeyed("kg*m", ge=0, le=10)] = 0.01
+    """Mass times the distance of its centre from the axis."""
     phase_rad: Annotated[float, SiKeyed("rad", ge=-2 * math.pi, le=2 * math.pi)] = 0.0
+    """Direction of the centre at the shaft's angle zero."""
     plane: str | None = None
+    """Place along the shaft: its wheel, or one of its bearings."""
 
 
 def place(params: UnbalanceParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
