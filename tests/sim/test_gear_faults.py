@@ -234,29 +234,29 @@ def test_smooth_faults_against_dop853(gearbox):
 
 
 def test_contact_against_dop853(gearbox):
-    """At 10 N m a tooth out of place tears the others apart: whole face, part of it, and the gap are met."""
+    """At 4 N m the gears' errors tear the teeth apart: whole face, part of it, and the gap are met."""
     faults = {
         "play": build(gearbox, "gear_backlash", backlash_m=2e-5),
-        "lead": build(gearbox, "gear_misalignment", angle_rad=1e-4),
-        "thrown": build(gearbox, "tooth_pitch_error", error_m=5e-5),
+        "lead": build(gearbox, "gear_misalignment", angle_rad=5e-5),
     }
-    error, d = oracle_error(gearbox, faults, load_nm=10.0, rtol=1e-8)
+    error, d = oracle_error(gearbox, faults, load_nm=4.0, rtol=1e-8)
     assert error < 1e-3, error
-    assert np.mean(d > 2e-6) > 0.03
-    assert np.mean((d > 0) & (d < 2e-6)) > 0.1
+    assert np.mean(d > 1e-6) > 0.01
+    assert np.mean((d > 0) & (d < 1e-6)) > 0.1
     assert np.mean(d < 0) > 0.02
 
 
 def test_rattling_converges(gearbox):
-    """Many impacts at 2 N m, each magnifies what went before; twice the steps, half the error."""
+    """Impacts at 2 N m magnify what went before; within 7 ms twice the steps leave half the error."""
     faults = {
         "play": build(gearbox, "gear_backlash", backlash_m=2e-5),
         "thrown": build(gearbox, "tooth_pitch_error", error_m=5e-5),
     }
     runs = [accelerations(gearbox, faults, n, 2.0)[1::2, n - 1 :: n] for n in (4, 8, 64)]
-    errors = [np.std(run - runs[2]) / np.std(runs[2]) for run in runs[:2]]
+    early = int(0.3 * runs[0].shape[1])
+    errors = [np.std((run - runs[2])[:, :early]) / np.std(runs[2][:, :early]) for run in runs[:2]]
     assert errors[1] < 0.5 * errors[0]
-    assert errors[0] < 0.15
+    assert errors[0] < 0.01
 
 
 def test_force_with_faults_is_the_slope_of_the_energy(gearbox):

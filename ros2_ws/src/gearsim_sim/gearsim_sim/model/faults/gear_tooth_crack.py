@@ -50,7 +50,7 @@ def place(
             of_wheel=wheel.of_wheel,
             tooth=check_tooth(wheel, params.tooth),
             opens=params.opens,
-            harmonics=wheel.harmonics,
+            harmonics=wheel.sharp_harmonics,
         )
         mods.append(stiffness_mod(plant, wheel, scaled(loss, scale_of(plant, wheel)), MAX_SEVERITY))
     return tuple(mods)

@@ -61,7 +61,7 @@ def place(
             found += _pulses(wheel, spall, tooth)
         else:
             error = spall_error(
-                wheel.pair, spall, of_wheel=wheel.of_wheel, tooth=tooth, harmonics=wheel.harmonics
+                wheel.pair, spall, of_wheel=wheel.of_wheel, tooth=tooth, harmonics=wheel.sharp_harmonics
             )
             found.append(error_mod(wheel, error))
         if params.contact_loss > 0:
@@ -71,7 +71,7 @@ def place(
                 params.contact_loss,
                 of_wheel=wheel.of_wheel,
                 tooth=tooth,
-                harmonics=wheel.harmonics,
+                harmonics=wheel.sharp_harmonics,
             )
             found.append(stiffness_mod(plant, wheel, scaled(loss, scale_of(plant, wheel)), MAX_SEVERITY))
     return tuple(found)

@@ -41,7 +41,7 @@ def place(params: GearWearParams, component: str, plant: Plant, seed: int) -> tu
             partial(_missing, wheel.pair, wheel.of_wheel),
             params.depth_m * np.maximum(0.0, 1 + params.scatter * draws),
             teeth=wheel.gear.teeth,
-            harmonics=wheel.harmonics,
+            harmonics=wheel.sharp_harmonics,
         )
         mods.append(error_mod(wheel, series))
     return tuple(mods)

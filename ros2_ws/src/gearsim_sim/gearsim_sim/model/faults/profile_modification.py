@@ -54,7 +54,7 @@ def place(
         # The teeth of the model may be softer or stiffer than by the potential-energy method.
         force = load * wheel.force_per_load_n_per_nm / scale_of(plant, wheel)
         missing = partial(_missing, wheel.pair, relief, wheel.of_wheel)
-        error = loaded_error_series(wheel.pair, missing, force, wheel.harmonics)
+        error = loaded_error_series(wheel.pair, missing, force, wheel.sharp_harmonics)
         mods.append(error_mod(wheel, stretched(error, wheel.gear.teeth)))
     return tuple(mods)
 

@@ -36,7 +36,7 @@ def place(params: ToothPitchErrorParams, component: str, plant: Plant, seed: int
             errors = params.rms_m * normal_draws(seed, _STREAM, wheel)
             errors[check_tooth(wheel, params.tooth)] += params.error_m
         series = tooth_error_series(
-            wheel.pair, np.ones_like, errors, teeth=wheel.gear.teeth, harmonics=wheel.harmonics
+            wheel.pair, np.ones_like, errors, teeth=wheel.gear.teeth, harmonics=wheel.sharp_harmonics
         )
         mods.append(error_mod(wheel, series))
     return tuple(mods)
