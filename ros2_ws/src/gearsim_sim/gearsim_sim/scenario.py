@@ -54,10 +54,15 @@ class FaultModel(Strict):
     """A fault; `params` have the unit in the key, such as `{width_m: 0.8 mm}`."""
 
     kind: str = Field(min_length=1)
+    """Kind of fault, such as `outer_race_spall`."""
     component: str = Field(min_length=1)
+    """Component that has it, such as `bearing_3`."""
     params: dict[str, Any] = Field(default_factory=dict)
+    """Parameters of the kind."""
     severity: Annotated[float, Si("", ge=0, le=2)] = 1.0
+    """Factor on the fault; 0 is healthy, 1 the full fault."""
     id: str = ""
+    """Name to clear it by; `component/kind` if left out."""
 
     def spec(self) -> FaultSpec:
         """As the engine takes it."""
@@ -68,27 +73,34 @@ class InjectModel(FaultModel):
     """A fault that begins and grows within `ramp`."""
 
     ramp: Seconds = 0.1
+    """Time in which the fault grows."""
 
 
 class SetModel(Strict):
     """Another operating point, reached within `ramp`."""
 
     speed: Speed | None = None
+    """Speed to go to; as it is if left out."""
     load: Load | None = None
+    """Load to go to; as it is if left out."""
     ramp: Seconds = 1.0
+    """Time that it takes."""
 
 
 class ClearModel(Strict):
     """The end of a fault (of all without `id`) within `ramp`."""
 
     id: str = ""
+    """Fault to end; all if left out."""
     ramp: Seconds = 0.1
+    """Time in which it fades."""
 
 
 class EventModel(Strict):
     """Something that happens at a time of the stream."""
 
     at: Seconds
+    """Time of the stream."""
     inject: InjectModel | None = None
     set: SetModel | None = None
     clear: ClearModel | None = None
@@ -114,18 +126,27 @@ class ScenarioModel(Strict):
     """The file."""
 
     description: str = ""
+    """What the scenario shows, for people."""
     machine: str = "unsw_parallel"
+    """Shipped machine description, or path of one."""
     model: str = "lpm34"
+    """Model that simulates it."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    """Of all random numbers."""
     sample_rate: Annotated[float, Si("Hz", ge=1000, le=2e6)] = 65536.0
+    """Rate of the accelerometers."""
     oversampling: Annotated[int, Field(ge=2, le=16)] = 4
+    """Integration steps per sample."""
     batch_samples: Annotated[int, Field(ge=16, le=65536)] = 4096
+    """Samples per message."""
     rate_factor: Annotated[float, Si("", ge=0, le=1000)] = 1.0
+    """Pace of the live rig in times of real time; 0 is as fast as it goes."""
     operating_point: OperatingPointModel
     profile: ProfileModel = ProfileModel()
     structure: StructureModel = StructureModel()
     sensors: SensorsModel = SensorsModel()
     parameters: dict[str, Any] = Field(default_factory=dict)
+    """Dotted names of the machine's `model` section with other values."""
     faults: tuple[FaultModel, ...] = ()
     timeline: tuple[EventModel, ...] = ()
 

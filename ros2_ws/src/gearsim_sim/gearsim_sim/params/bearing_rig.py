@@ -39,6 +39,7 @@ class BearingRigModel(Strict):
     """The `model` section."""
 
     kind: Literal["bearing_rig"]
+    """What kind of machine the section describes."""
     drive: Drive
     shaft: Seat
     """What of the shaft moves with the inner ring, and the damper of the bearing."""

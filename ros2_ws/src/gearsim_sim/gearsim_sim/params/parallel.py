@@ -106,6 +106,7 @@ class ParallelModel(Strict):
     """The `model` section."""
 
     kind: Literal["parallel_shaft"]
+    """What kind of machine the section describes."""
     drive: Drive
     flywheel_1: TorsionalEnd
     flywheel_2: TorsionalEnd
@@ -121,6 +122,7 @@ class ParallelModel(Strict):
     ball_bearing: RollingBearing
     pedestal: Pedestal
     gravity_m_per_s2: Annotated[float, Si("m/s^2", ge=0), Field(alias="gravity")]
+    """Acceleration of gravity, against y."""
 
 
 class ParallelParams(Strict):

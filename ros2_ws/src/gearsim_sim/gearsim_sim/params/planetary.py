@@ -42,94 +42,138 @@ class Teeth(Strict):
     """What the nameplate does not tell of the teeth."""
 
     module_m: Annotated[float, Si("m", gt=0), Field(alias="module")]
+    """Module."""
     pressure_angle_rad: Annotated[float, Si("rad", gt=0, lt=math.pi / 4), Field(alias="pressure_angle")]
+    """Pressure angle."""
     addendum: Annotated[float, Si("", gt=0, le=1.5)]
+    """Height of the tooth above the pitch circle in modules."""
     face_width_m: Annotated[float, Si("m", gt=0), Field(alias="face_width")]
+    """Face width."""
     sun_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="sun_bore_radius")]
+    """Radius of the sun's bore."""
     planet_bore_radius_m: Annotated[float, Si("m", gt=0), Field(alias="planet_bore_radius")]
+    """Radius of the planets' bore."""
     ring_outer_radius_m: Annotated[float, Si("m", gt=0), Field(alias="ring_outer_radius")]
+    """Outer radius of the ring."""
 
 
 class Body(Strict):
     """A rigid wheel or the carrier."""
 
     mass_kg: Mass
+    """Mass."""
     inertia_kg_m2: Inertia
+    """Moment of inertia."""
 
 
 class Support(Strict):
     """The same spring and damper in x and in y."""
 
     stiffness_n_per_m: Stiffness
+    """Stiffness in x and y."""
     damping_ns_per_m: Damping
+    """Damping in x and y."""
 
 
 class RingSupport(Support):
     """How the ring is held, against turning too."""
 
     torsional_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="torsional_stiffness")]
+    """Torsional stiffness that holds the ring."""
     torsional_damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="torsional_damping")]
+    """Torsional damping of the ring."""
 
 
 class PlanetaryMesh(Strict):
     """Stiffness and damping of the tooth contacts; contact ratios follow from the teeth."""
 
     mean_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="mean_stiffness")]
+    """Mean stiffness of each mesh along its line of action."""
     damping_ns_per_m: Damping
+    """Damping of each mesh."""
     pair_stiffness_n_per_m: Annotated[float, Si("N/m", ge=0), Field(alias="pair_stiffness")]
+    """Stiffness of one pair of teeth; sets the mean through the contact ratio."""
     pair_stiffness_ratio: Annotated[float, Si("", ge=1, le=2)]
+    """Stiffness of two pairs over that of one."""
     potential_energy: Switch
+    """Stiffness from the teeth by the potential-energy method."""
     harmonics: Count
+    """Number of tooth mesh lines of the stiffness."""
 
 
 class PlanetaryErrors(Strict):
     """Transmission errors of the gears, (7.39) to (7.43) as smooth functions of angle."""
 
     runout_m: Annotated[float, Si("m", ge=0), Field(alias="runout")]
+    """Amplitude of the first order of run-out."""
     runout_harmonics: Count
+    """Number of orders of run-out."""
     profile_m: Annotated[float, Si("m", ge=0), Field(alias="profile")]
+    """Amplitude of the first line of the tooth profile error."""
     profile_harmonics: Count
+    """Number of lines of the tooth profile error."""
     pitch_rms_m: Annotated[float, Si("m", ge=0), Field(alias="pitch_rms")]
+    """Standard deviation of the random error of each tooth."""
     surface_rms_m: Annotated[float, Si("m", ge=0), Field(alias="surface_rms")]
+    """Standard deviation of the random surface."""
     identical_planets: Switch
+    """All planets have the same errors, as the thesis assumes."""
 
 
 class PlanetPositions(Strict):
     """Errors of the planet pins along their circle, drawn with this standard deviation."""
 
     error_m: Annotated[float, Si("m", ge=0), Field(alias="error")]
+    """Displacement of each pin along its circle."""
 
 
 class PlanetBearing(RollingBearing):
     """Planet bearings as Hertz contacts instead of linear springs; the springs' dampers stay."""
 
     included: Switch
+    """Planets run on Hertz bearings in place of linear springs."""
 
 
 class Casing(Strict):
     """A mass that carries sun shaft and ring, which the thesis's model lacks."""
 
     included: Switch
+    """Sun shaft and ring are joined through the casing."""
     mass_kg: Mass
+    """Mass of the casing's part in that path."""
     stiffness_n_per_m: Stiffness
+    """Stiffness between the ring and that mass."""
     damping_ns_per_m: Damping
+    """Damping between the ring and that mass."""
     sun_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="sun_stiffness")]
+    """Stiffness between the sun shaft and that mass."""
     sun_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="sun_damping")]
+    """Damping between the sun shaft and that mass."""
 
 
 class FirstStage(Strict):
     """The spur stage that drives the carrier."""
 
     included: Switch
+    """The spur stage before the planetary one is part of the model."""
     pinion_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="pinion_mass")]
+    """Mass of the pinion."""
     pinion_inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="pinion_inertia")]
+    """Moment of inertia of the pinion."""
     wheel_mass_kg: Annotated[float, Si("kg", gt=0), Field(alias="wheel_mass")]
+    """Mass of the wheel."""
     wheel_inertia_kg_m2: Annotated[float, Si("kg*m^2", gt=0), Field(alias="wheel_inertia")]
+    """Moment of inertia of the wheel."""
     module_m: Annotated[float, Si("m", gt=0), Field(alias="module")]
+    """Module of the spur stage."""
     shaft_stiffness_n_per_m: Annotated[float, Si("N/m", gt=0), Field(alias="shaft_stiffness")]
+    """Stiffness of the shafts' supports in x and y."""
     shaft_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="shaft_damping")]
+    """Damping of the shafts' supports."""
     coupling_stiffness_nm_per_rad: Annotated[float, Si("N*m/rad", gt=0), Field(alias="coupling_stiffness")]
+    """Torsional stiffness between the wheel and the carrier."""
     coupling_damping_nms_per_rad: Annotated[float, Si("N*m*s/rad", ge=0), Field(alias="coupling_damping")]
+    """Torsional damping between the wheel and the carrier."""
 
 
 class PlanetaryPhysics(Strict):
@@ -149,6 +193,7 @@ class PlanetaryModel(Strict):
     """The `model` section."""
 
     kind: Literal["planetary"]
+    """What kind of machine the section describes."""
     drive: Drive
     teeth: Teeth
     carrier: Body

@@ -23,7 +23,9 @@ class PlanetPositionErrorParams(Strict):
     """Where the pin is, from where it should be: ahead in the sense in which the carrier drives it."""
 
     ahead_m: Annotated[float, SiKeyed("m", ge=-1e-3, le=1e-3)] = 2e-6
+    """Displacement of the pin in the direction of rotation."""
     outward_m: Annotated[float, SiKeyed("m", ge=-1e-3, le=1e-3)] = 0.0
+    """Displacement of the pin away from the centre."""
 
 
 def place(params: PlanetPositionErrorParams, component: str, plant: Plant, seed: int) -> tuple[MeshMod, ...]:  # noqa: ARG001

@@ -25,11 +25,17 @@ class PlanetToothCrackParams(Strict):
     """
 
     opens_towards: Literal["sun", "ring"] = "sun"
+    """Mesh that pulls the crack open."""
     depth_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Length of the crack; to the middle of the tooth if left out."""
     angle_rad: Annotated[float, SiKeyed("rad", gt=0, le=math.pi / 2)] = math.pi / 4
+    """Angle between the crack and the tooth's centre line."""
     width_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Part of the face width that is cracked; all if left out."""
     closing: Annotated[float, SiKeyed("", ge=0, le=1)] = 0.3
+    """Share of the loss that is left in the mesh that presses the crack shut."""
     tooth: Count = 1
+    """Number of the tooth, from 1."""
 
 
 def place(params: PlanetToothCrackParams, component: str, plant: Plant, seed: int) -> tuple[MeshMod, ...]:  # noqa: ARG001

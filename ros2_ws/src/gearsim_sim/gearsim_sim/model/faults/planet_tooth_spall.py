@@ -23,12 +23,19 @@ class PlanetToothSpallParams(Strict):
     """
 
     side: Literal["sun", "ring"] = "sun"
+    """Flank that is spalled: the one that meets sun or ring."""
     width_m: Annotated[float, SiKeyed("m", gt=0)] = 1e-3
+    """Length of the spall along the profile."""
     depth_m: Annotated[float, SiKeyed("m", gt=0)] = 0.1e-3
+    """Depth of the spall."""
     radius_m: Annotated[float, SiKeyed("m", gt=0)] | None = None
+    """Radius of its middle on the tooth; the pitch circle if left out."""
     face_fraction: Annotated[float, SiKeyed("", gt=0, le=1)] = 1.0
+    """Part of the face width that is spalled."""
     shape: Literal["rounded", "rectangular"] = "rounded"
+    """Smooth or rectangular edges."""
     tooth: Count = 1
+    """Number of the tooth, from 1."""
 
 
 def place(params: PlanetToothSpallParams, component: str, plant: Plant, seed: int) -> tuple[MeshMod, ...]:  # noqa: ARG001

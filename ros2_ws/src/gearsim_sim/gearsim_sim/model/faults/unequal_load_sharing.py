@@ -25,6 +25,7 @@ class UnequalLoadSharingParams(Strict):
     """`excess`: how much more than its part the planet carries at the nominal load (0.3: 30 % more)."""
 
     excess: Annotated[float, SiKeyed("", gt=-1, le=10)] = 0.3
+    """Load of this planet above its equal share, as a fraction of it."""
 
 
 def place(params: UnequalLoadSharingParams, component: str, plant: Plant, seed: int) -> tuple[MeshMod, ...]:  # noqa: ARG001
