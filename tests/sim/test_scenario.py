@@ -106,7 +106,7 @@ def test_full_scale_is_not_known_without_a_range(tmp_path):
 
 BAD = [
     ("speed: 10 Hz", "speed: got 10 Hz, expected no such key; one of batch_samples, description, faults, "),
-    ("model: lpm99", "model: got lpm99, expected one of lpm34"),
+    ("model: lpm99", "model: got lpm99, expected one of bearing2, "),
     ("seed: -1", "seed: got -1, expected "),
     ("sample_rate: 65536", "sample_rate: got 65536, expected a number in Hz, >= 1000 and <= 2e+06 (the unit"),
     ("sample_rate: 65536 m", "(not m)"),
@@ -116,10 +116,10 @@ BAD = [
     ("batch_samples: 60000", "batch_samples: got 60000, expected at most 15000, so that a message of 8"),
     ("batch_samples: many", "batch_samples: got many, expected "),
     ("rate_factor: -2", "rate_factor: got -2, expected a number without unit, >= 0"),
-    ("faults: [{kind: x, component: y}]", "faults.0: kind: got x, expected one of inner_race_spall, "),
+    ("faults: [{kind: x, component: y}]", "faults.0: kind: got x, expected one of ball_waviness, "),
     (
         "faults: [{kind: outer_race_spall, component: bearing_1, params: {width: 1 mm}}]",
-        "faults.0: width: got 1 mm, expected no such key; one of depth_m, position_rad, row, width_m",
+        "faults.0: width: got 1 mm, expected no such key; one of depth_m, geometry, position_rad, row, width_m",
     ),
     (
         "timeline: [{at: 1 s, inject: {kind: outer_race_spall, component: b, params: {width_m: 1 V}}}]",
@@ -179,7 +179,7 @@ def test_bad_wholes(tmp_path, base, message):
 
 
 def test_unknown_names_and_files(tmp_path):
-    with pytest.raises(InputError, match="scenario: got nope, expected one of demo, healthy, "):
+    with pytest.raises(InputError, match="scenario: got nope, expected one of added_structure, "):
         load_scenario("nope")
     with pytest.raises(InputError, match="or the path of a"):
         load_scenario(tmp_path / "none.yaml")
