@@ -64,7 +64,5 @@ def accelerations(
     Everything but `oversampling` must be the same for the signal and for its truth, for which
     TRUTH_OVERSAMPLING is meant.
     """
-    engine = Engine(
-        params, seed, sample_rate_hz, oversampling, faults, speed_hz=speed_hz, load_nm=load_nm
-    )
+    engine = Engine(params, seed, sample_rate_hz, oversampling, faults, speed_hz=speed_hz, load_nm=load_nm)
     return engine.advance(round(seconds * sample_rate_hz)).accel
