@@ -72,4 +72,6 @@ KIND = FaultKind(
     params_model=LoosenessParams,
     components=components,
     place=place,
+    look_for="a waveform cut off on one side, and many multiples of the shaft's speed, halves among "
+    "them; mostly at the loose pedestal and in the direction of lifting",
 )

@@ -37,4 +37,6 @@ KIND = FaultKind(
     params_model=ResonanceParams,
     components=hangable_sites,
     place=place,
+    look_for="a hump in the spectrum at the added frequency wherever broad-band excitation reaches "
+    "it; lines and impulses near it ring longer",
 )

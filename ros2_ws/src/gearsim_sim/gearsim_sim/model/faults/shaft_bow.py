@@ -60,4 +60,6 @@ KIND = FaultKind(
     params_model=ShaftBowParams,
     components=bending_shaft_names,
     place=place,
+    look_for="a line at the shaft's speed that does not grow with speed, and a mean shift of the load "
+    "in the bearings; told from unbalance by a change of speed",
 )

@@ -103,4 +103,6 @@ KIND = FaultKind(
     params_model=ShaftMisalignmentParams,
     components=coupled_shaft_names,
     place=place,
+    look_for="lines at one, two and three times the shaft's speed, the second often the strongest, "
+    "across the coupling's end of the shaft",
 )

@@ -43,4 +43,6 @@ KIND = FaultKind(
     params_model=TransferPathParams,
     components=joinable_sites,
     place=place,
+    look_for="the band of the path appears at the far site, coherent with the near one; lines there "
+    "change their height, and none is added",
 )

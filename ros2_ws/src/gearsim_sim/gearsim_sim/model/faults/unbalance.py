@@ -47,4 +47,6 @@ KIND = FaultKind(
     params_model=UnbalanceParams,
     components=shaft_names,
     place=place,
+    look_for="a line at the shaft's speed in both directions, a quarter turn apart, growing with the "
+    "square of the speed; almost nothing at its multiples or in the envelope",
 )
