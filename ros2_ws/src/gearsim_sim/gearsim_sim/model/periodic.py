@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 # Points per period of the highest order in a table. Cubic Hermite interpolation then errs by
 # (2 pi / 48)^4 / 384 = 8e-7 of that order's amplitude, and by far less of all lower orders.
 _POINTS_PER_PERIOD = 48
+# Low orders come with large amplitudes (run-out): more points cost nothing there and push that error away.
+_LEAST_POINTS = 1024
 _WAVES_AT_ONCE = 32
 
 
@@ -59,7 +61,7 @@ class PeriodicSeries:
         first so that no index needs to wrap.
         """
         highest = int(self.orders.max()) if self.orders.size else 1
-        points = 1 << int(np.ceil(np.log2(highest * _POINTS_PER_PERIOD)))
+        points = max(_LEAST_POINTS, 1 << int(np.ceil(np.log2(highest * _POINTS_PER_PERIOD))))
         spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
         np.add.at(spectrum, self.orders, (self.cosine - 1j * self.sine) / 2)
         spectrum[0] = self.mean
