@@ -17,7 +17,7 @@ from gearsim_io.quantities import Si, validate
 from gearsim_sim.engine import Engine
 from gearsim_sim.events import Clear, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.faults import REGISTRY
-from gearsim_sim.scenario import load_scenario
+from gearsim_sim.scenario import load_scenario, scenario_names
 from gearsim_sim.verify.machines import SEED, load_for, machine_of, model_names, params_of, plant_of
 
 RATE_HZ = 4096.0
@@ -232,6 +232,24 @@ def test_every_number_has_a_range_and_is_refused_outside(kind):
             assert error.value.field == name
     with pytest.raises(InputError):
         validate(params, {"no_such_parameter": 1.0}, "here")
+
+
+@cache
+def shown_kinds():
+    """Kinds of fault in the shipped scenarios."""
+    shown = set()
+    for name in scenario_names():
+        scenario = load_scenario(name)
+        injected = [event.fault for event in scenario.events if isinstance(event, Inject)]
+        shown |= {one.kind for one in (*scenario.faults, *injected)}
+    return shown
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_described_and_has_an_example(kind):
+    assert REGISTRY[kind].summary
+    assert REGISTRY[kind].look_for
+    assert kind in shown_kinds()
 
 
 @pytest.mark.parametrize("kind", KINDS)
