@@ -17,6 +17,7 @@ from gearsim_sim.engine import Engine
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.model.faults import REGISTRY
 from gearsim_sim.model.loop_data import COLUMNS
+from gearsim_sim.model.side_data import SIDE_TABLES
 from gearsim_sim.verify import accuracy, energy
 from gearsim_sim.verify.accuracy import HEALTHY, kinds_on, measure
 from gearsim_sim.verify.energy import EnergyCase, balance
@@ -30,7 +31,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 def published():
     """(model, kind) -> error of docs/accuracy.md."""
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\w+) \| (\w+) \| (\w*) \| ([-+.e\d]+) \|", text, re.MULTILINE)
+    rows = re.findall(r"^\| (\w+) \| (\w+) \| ([\w.]*) \| ([-+.e\d]+) \|", text, re.MULTILINE)
     return {(model, kind): float(error) for model, kind, _, error in rows}
 
 
@@ -55,7 +56,11 @@ def test_healthy_models_follow_dop853(model):
     check(model, HEALTHY)
 
 
-@pytest.mark.parametrize("table", sorted(COLUMNS))
+# No fault has a pulse unless it is asked to be rectangular: a jump, which test_gear_faults measures.
+TABLES = sorted({*COLUMNS, *SIDE_TABLES} - {"mesh_pulses"})
+
+
+@pytest.mark.parametrize("table", TABLES)
 def test_a_fault_of_each_table_follows_dop853(table):
     cases = ((model, kind) for model in model_names() for kind in kinds_on(model)[1:])
     check(*next(case for case in cases if table in tables_of(*case)))
@@ -137,7 +142,10 @@ def test_the_ledger_notices_what_is_wrong(spoil):
 
 @pytest.mark.parametrize("model", model_names())
 def test_an_endless_run_needs_no_more_memory(model):
-    """A million steps in 64 portions leave less behind than one array a portion would, some 300 bytes."""
+    """A million steps in 64 portions leave a fraction of one array of each portion behind (4 kB), at most.
+
+    What does grow are Python's own stores of numbers, which are full after some hundred portions.
+    """
     engine = Engine(params_of(model), SEED, 4096.0)
 
     def run_on(portions):
@@ -152,7 +160,7 @@ def test_an_endless_run_needs_no_more_memory(model):
         after = run_on(64)
     finally:
         tracemalloc.stop()
-    assert after - before < 20_000
+    assert after - before < 64 * 1000
 
 
 @pytest.mark.parametrize("model", model_names())
