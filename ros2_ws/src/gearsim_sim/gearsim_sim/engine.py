@@ -209,8 +209,13 @@ class Engine:
         """Speed of the reference shaft [Hz] and load [N m] at a sample that has been handed out."""
         return self._schedule.operating_point(sample * self._steps)
 
-    def warm_up(self) -> None:
-        """Compile everything that `advance` uses; the constructor has done so already."""
+    def warm_up(self, *, events: bool = False) -> None:
+        """Compile what `advance` uses; the constructor has done so already.
+
+        With `events` also what only events bring (a stream should call this before it starts).
+        """
+        if events:
+            self._stepper.compile_all()
         decimate(self._accel, 0, self._taps, self._steps, np.empty((self._accel.shape[0], 1)), 0, 1)
 
     def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:

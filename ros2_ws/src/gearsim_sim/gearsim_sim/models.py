@@ -27,6 +27,10 @@ class RunningModel(Protocol):
         """Earliest sample at which an event may start now."""
         ...
 
+    def warm_up(self, *, events: bool = False) -> None:
+        """Compile what is needed, with `events` what only events bring, too."""
+        ...
+
     def advance(self, n: int, events: Sequence[Event] = ()) -> EngineOutput:
         """The next `n` samples."""
         ...

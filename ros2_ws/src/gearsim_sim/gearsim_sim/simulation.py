@@ -80,6 +80,10 @@ class Simulation:
         """Their duration."""
         return self._sent / self.scenario.sample_rate_hz
 
+    def warm_up(self) -> None:
+        """Compile all that any event may bring; for a live stream, before it starts."""
+        self._model.warm_up(events=True)
+
     def advance(self, n_samples: int) -> list[Batch]:
         """Run so many samples further and hand out the batches that are complete.
 

@@ -157,6 +157,18 @@ class Stepper:
             states.append(pack_state(setup.propagator, z, known, rest.forces[setup.interfaces]))
         return states[0], states[1]
 
+    def compile_all(self) -> None:
+        """Compile every variant of the loop (or load it), so that no fault on the way has to wait for it."""
+        schedule, accel = self._schedule, np.zeros((self.row_count, 1))
+        drive = schedule.drive()
+        work = make_work(self._data, drive, self._place.size)
+        fluctuates = schedule.profile.fluctuation_nm is not None
+        side = self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
+        motion = np.empty((1, MOTION_COLUMNS + len(self._rows) + self._place.size))
+        for loop in self._loops:
+            s0, s1 = (one.copy() for one in self._state)
+            loop(s0, s1, self._data, drive, side, self._memory, work, self.step, 0, accel, 0, motion)
+
     def advance(self, count: int, accel: Array, column: int) -> Motion:
         """Integrate `count` steps; accelerations go to accel[:, column : column + count]."""
         width = MOTION_COLUMNS + len(self._rows) + self._place.size

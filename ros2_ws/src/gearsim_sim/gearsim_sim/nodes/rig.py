@@ -42,6 +42,7 @@ class Simulator(Node):
             self, clock=given.publish_clock, torque=bool(scenario.sensors.torques)
         )
         self._simulation = Simulation(scenario)
+        self._simulation.warm_up()
         self._rig_services = RigServices(self, self._simulation)
         self._pacer = Pacer(scenario.sample_rate_hz, scenario.rate_factor)
         self._end = round(given.end_after * scenario.sample_rate_hz) or math.inf
