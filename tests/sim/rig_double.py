@@ -30,7 +30,7 @@ class RigDouble:
 
     steady = True
 
-    def operating_point_at(self, sample):
+    def operating_point_at(self, sample):  # noqa: ARG002
         raise AssertionError("nobody needs that of a steady rig")
 
     def angle_turns(self, sample, shaft=0):

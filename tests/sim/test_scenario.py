@@ -119,7 +119,8 @@ BAD = [
     ("faults: [{kind: x, component: y}]", "faults.0: kind: got x, expected one of ball_waviness, "),
     (
         "faults: [{kind: outer_race_spall, component: bearing_1, params: {width: 1 mm}}]",
-        "faults.0: width: got 1 mm, expected no such key; one of depth_m, geometry, position_rad, row, width_m",
+        "faults.0: width: got 1 mm, expected no such key; one of depth_m, geometry, position_rad, row, "
+        "width_m",
     ),
     (
         "timeline: [{at: 1 s, inject: {kind: outer_race_spall, component: b, params: {width_m: 1 V}}}]",

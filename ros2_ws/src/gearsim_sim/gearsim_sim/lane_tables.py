@@ -32,7 +32,7 @@ def check_alike(number: int, data: Data, first: Data) -> None:
         (own, getattr(first.bearings, name)) for name, own in bearings._asdict().items() if name != "numbers"
     ]
     pairs += [
-        (meshes.index[:, [0, 1, 4, 5]], first.meshes.index[:, [0, 1, 4, 5]]),
+        (meshes.places[:, [0, 1, 4, 5]], first.meshes.places[:, [0, 1, 4, 5]]),
         (meshes.errors[:, 0], first.meshes.errors[:, 0]),
         (data.rotations, first.rotations),
     ]
@@ -45,7 +45,7 @@ def pack_elements(data: Sequence[Data], plant: Plant) -> LaneElements:
     """Constants of the force elements of all lanes; `plant` is that of any lane."""
     bearings, meshes = data[0].bearings, data[0].meshes
     tables, located = _located([one.meshes for one in data])
-    places = [np.concatenate([one.index[:, 2:4], one.errors[:, 1:3]]).ravel() for one in located]
+    places = [np.concatenate([one.places[:, 2:4], one.errors[:, 1:3]]).ravel() for one in located]
     return LaneElements(
         bearings=bearings,
         bearing_numbers=_lanes(one.bearings.numbers.ravel() for one in data),
@@ -57,7 +57,7 @@ def pack_elements(data: Sequence[Data], plant: Plant) -> LaneElements:
         meshes=meshes,
         mesh_numbers=_lanes(one.numbers.ravel() for one in located),
         table_places=_lanes(places),
-        lane_index=np.array([one.index for one in located]),
+        lane_index=np.array([one.places for one in located]),
         lane_numbers=np.array([one.numbers for one in located]),
         lane_errors=np.array([one.errors for one in located]),
         tables=tables,
@@ -82,7 +82,7 @@ def _located(meshes: Sequence[Meshes]) -> tuple[Array, list[Meshes]]:
     size = 1
     result = []
     for one in meshes:
-        index, errors = one.index.copy(), one.errors.copy()
+        index, errors = one.places.copy(), one.errors.copy()
         for row in (*index[:, 2:4], *errors[:, 1:3]):
             table = one.tables[row[0] : row[0] + 2 * (row[1] + 1)]
             key = table.tobytes()
@@ -91,14 +91,14 @@ def _located(meshes: Sequence[Meshes]) -> tuple[Array, list[Meshes]]:
                 kept.append(table)
                 size += table.size
             row[0] = known[key]
-        result.append(one._replace(index=index, errors=errors))
+        result.append(one._replace(places=index, errors=errors))
     return np.concatenate(kept), result
 
 
 def make_work(elements: LaneElements, drive: LaneDrive, inputs: int, interfaces: int) -> LaneWork:
     """Work space of the loop for so many tracks and fault rows."""
     bearings, balls = elements.bearings.cosines.shape
-    meshes, tracks, spalls = elements.meshes.index.shape[0], drive.rates.shape[0], drive.spalls.shape[1]
+    meshes, tracks, spalls = elements.meshes.places.shape[0], drive.rates.shape[0], drive.spalls.shape[1]
     return LaneWork(
         phases=aligned(np.zeros((tracks, LANES))),
         speeds=aligned(np.zeros((1, LANES))),

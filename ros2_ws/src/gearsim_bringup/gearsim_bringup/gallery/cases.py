@@ -9,6 +9,7 @@ from gearsim_io.errors import InputError
 from gearsim_sim.events import FaultSpec, Inject
 from gearsim_sim.model.faults import REGISTRY
 from gearsim_sim.scenario import Scenario, load_scenario, scenario_names
+from gearsim_sim.sensors.rows import Row, SensorTable, Tacho
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def _case(kind: str, scenarios: list[Scenario]) -> Case:
     example = min(showing, key=lambda one: (one.name != kind, len(faults_of(one)), one.name))
     mine = [fault for fault in faults_of(example) if fault.kind == kind]
     others = tuple(fault for fault in example.faults if fault.kind != kind)
-    quiet = example.with_events([])
+    quiet = dataclasses.replace(example.with_events([]), sensors=_ideal(example.sensors))
     return Case(
         kind=kind,
         example=example.name,
@@ -64,3 +65,9 @@ def _case(kind: str, scenarios: list[Scenario]) -> Case:
         healthy=dataclasses.replace(quiet, faults=others),
         component=mine[0].component,
     )
+
+
+def _ideal(table: SensorTable) -> SensorTable:
+    """The same accelerometers without any error of their own, and no other sensors but tachos."""
+    rows = tuple(Row(row.channel, row.site, row.axis) for row in table.accelerometers)
+    return SensorTable(rows, tuple(Tacho(one.shaft) for one in table.tachos), ())

@@ -119,7 +119,7 @@ def enter_terms(
             now[b, SLIPS] = 1.0
             gone = memory.cage[b, WAY]
             if what == _SLIP:
-                cage_rate, spin_rate = drive.rates[bearings.index[b, 2]], drive.rates[bearings.spins[b]]
+                cage_rate, spin_rate = drive.rates[bearings.places[b, 2]], drive.rates[bearings.spins[b]]
                 enter_slip(row, level, way, memory.cage[b], cage_rate, spin_rate)
             elif what == _CAGE_JITTER:
                 now[b, CAGE] += level * row[_OWN + 2] * jitter(int(row[_OWN + 4]), gone * row[_OWN + 3], 0)
@@ -130,7 +130,7 @@ def enter_terms(
                 enter_play(row, level, gone, memory.play[b])
     for b in range(now.shape[0]):
         if now[b, SLIPS] != 0.0:
-            memory.cage[b, WAY] += abs(drive.rates[bearings.index[b, 2]] * way)
+            memory.cage[b, WAY] += abs(drive.rates[bearings.places[b, 2]] * way)
 
 
 @inlined
@@ -158,7 +158,7 @@ def spall_place(
         away = middle - math.floor(middle + 0.5)
     else:
         count = bearings.balls_per_row[b]
-        cage = phases[bearings.index[b, 2]] + cage_ahead
+        cage = phases[bearings.places[b, 2]] + cage_ahead
         place = (middle - cage - bearings.row_offsets[b, int(row[_OWN + 1])]) * count
         nearest = math.floor(place + 0.5)
         ball = int(row[_OWN + 1]) * count + int(nearest) % count
@@ -186,7 +186,7 @@ def step_fraction(away: float, row: Array, way: float, drive: Drive, bearings: B
     """Part of this step in a rectangular pit, see `pit.inside_fraction`; `way` is the reference shaft's."""
     rate = row[_OWN + 4] * drive.rates[int(row[_OWN + 3])]
     if row[_OWN + 2] < 0.0:
-        rate -= drive.rates[bearings.index[int(row[_OWN]), 2]]
+        rate -= drive.rates[bearings.places[int(row[_OWN]), 2]]
     travel = abs(TWO_PI * rate * way)
     if travel == 0.0:
         return 1.0 if abs(away) < row[_OWN + 6] else 0.0
@@ -248,7 +248,7 @@ def enter_profiles(
         turned = row[_OWN + 6] + row[_OWN + 4] * phases[int(row[_OWN + 3])]
         on_ball = row[_OWN + 5] != 0.0
         if not on_ball:
-            turned -= phases[bearings.index[b, 2]] + now[b, CAGE]
+            turned -= phases[bearings.places[b, 2]] + now[b, CAGE]
         else:
             turned += now[b, SPIN]
         now[b, DIRTY] = 1.0

@@ -218,12 +218,12 @@ def jump_forces(
     """What rectangular pits change in the forces: the force without the pit, part by part that with it."""
     for i in range(found):
         b, ball = int(jumps[i, 0]), int(jumps[i, 1])
-        c, s = cosine_sine(phases[bearings.index[b, 2]] + now[b, CAGE], circle)
+        c, s = cosine_sine(phases[bearings.places[b, 2]] + now[b, CAGE], circle)
         own_c, own_s = bearings.cosines[b, ball], bearings.sines[b, ball]
         if now[b, PLAY] != 0.0:
             own_c, own_s = memory.cosines[b, ball], memory.sines[b, ball]
         ux, uy = own_c * c - own_s * s, own_c * s + own_s * c
-        ix, iy = bearings.index[b, 0], bearings.index[b, 1]
+        ix, iy = bearings.places[b, 0], bearings.places[b, 1]
         gap = q[ix] * ux + q[iy] * uy - bearings.numbers[b, 1] - now[b, CLEARANCE] - memory.missing[b, ball]
         if now[b, FILM] > 0.0:
             gap += now[b, FILM] * memory.film[b, ball]
@@ -251,12 +251,12 @@ def bearing_forces(
     if drive.profiles.shape[0] > 0:
         enter_profiles(step, phases, drive, bearings, memory, now)
     cage, c, s = -1.0, 1.0, 0.0
-    for b in range(bearings.index.shape[0]):
-        angle = phases[bearings.index[b, 2]] + now[b, CAGE]
+    for b in range(bearings.places.shape[0]):
+        angle = phases[bearings.places[b, 2]] + now[b, CAGE]
         if angle != cage:  # bearings of one kind on one shaft share their cage's angle
             cage = angle
             c, s = cosine_sine(cage, circle)
-        ix, iy = bearings.index[b, 0], bearings.index[b, 1]
+        ix, iy = bearings.places[b, 0], bearings.places[b, 1]
         x, y = q[ix], q[iy]
         along, across = x * c + y * s, y * c - x * s
         clearance = bearings.numbers[b, 1] + now[b, CLEARANCE]
@@ -272,7 +272,7 @@ def bearing_forces(
             memory.cage[b, MEAN_FORCE] += (size - memory.cage[b, MEAN_FORCE]) * (step_s / _FORCE_MEMORY_S)
     if found > 0:
         jump_forces(found, q, phases, bearings, circle, memory, now, jumps, forces)
-    for b in range(bearings.index.shape[0]):
+    for b in range(bearings.places.shape[0]):
         if now[b, DIRTY] != 0.0:
             now[b, DIRTY] = 0.0
             for j in range(balls):

@@ -22,9 +22,9 @@ from gearsim_sim.model.mesh_loop import mesh_forces
 def turn_frames(elements: LaneElements, work: LaneWork) -> None:
     """Cosine and sine of the azimuth of the ball nearest to the load, and its number in the cage."""
     bearings = elements.bearings
-    for b in range(bearings.index.shape[0]):
+    for b in range(bearings.places.shape[0]):
         count = float(bearings.balls_per_row[b])
-        cage = load(work.phases, bearings.index[b, 2])
+        cage = load(work.phases, bearings.places[b, 2])
         shift = floor(fma(load(elements.directions, b) - cage, splat(count), splat(0.5)))
         c, s = cosines_sines(fma(shift, splat(1.0 / count), cage))
         store(work.frames, 3 * b, c)
@@ -54,7 +54,7 @@ def rows_of(lane: int, drive: LaneDrive, work: LaneWork) -> Any:
 def place_lane_spalls(step: int, elements: LaneElements, drive: LaneDrive, work: LaneWork) -> int:
     """Enter what pits take away into `work.missing`; returns how many `work.marks` say where."""
     bearings = elements.bearings
-    balls = elements.cosines.size // max(bearings.index.shape[0], 1)
+    balls = elements.cosines.size // max(bearings.places.shape[0], 1)
     marks = 0
     for k in range(drive.pitted.size):
         lane = drive.pitted[k]
@@ -83,7 +83,7 @@ def lane_bearing_forces(
     """Forces of all bearings beyond their linear part, with pits but no other faults."""
     turn_frames(elements, work)
     marks = place_lane_spalls(step, elements, drive, work)
-    index = elements.bearings.index
+    index = elements.bearings.places
     balls = elements.cosines.size // max(index.shape[0], 1)
     for b in range(index.shape[0]):
         c, s = load(work.frames, 3 * b), load(work.frames, 3 * b + 1)
@@ -110,7 +110,7 @@ def lane_mesh_forces(
     motion: Array, speed: Any, elements: LaneElements, drive: LaneDrive, work: LaneWork, forces: Array
 ) -> None:
     """Forces of all meshes beyond their linear part, without faults and pulses."""
-    index, errors = elements.meshes.index, elements.meshes.errors
+    index, errors = elements.meshes.places, elements.meshes.errors
     count, columns = index.shape[0], elements.meshes.numbers.shape[1]
     numbers, places = elements.mesh_numbers, elements.table_places
     for i in range(count):
@@ -171,16 +171,16 @@ def ill_bearing_forces(
         rows = rows_of(lane, drive, work)
         take_motion(lane, motion, work)
         bearings = Bearings(
-            common.index, elements.lane_bearings[lane], common.cosines, common.sines, common.azimuths,
+            common.places, elements.lane_bearings[lane], common.cosines, common.sines, common.azimuths,
             common.row_offsets, common.balls_per_row, common.rollers, common.spins,
         )  # fmt: skip
         bearing_forces(
             step, work.lane_motion, work.lane_phases, work.speeds[0, lane], rows, bearings, elements.circle,
             memory_of(memory, lane), work.now[lane], work.jumps, work.lane_forces, elements.step_s, balls,
         )  # fmt: skip
-        for b in range(common.index.shape[0]):
+        for b in range(common.places.shape[0]):
             for axis in range(2):
-                forces[common.index[b, axis], lane] = work.lane_forces[common.index[b, axis]]
+                forces[common.places[b, axis], lane] = work.lane_forces[common.places[b, axis]]
 
 
 @inlined
@@ -200,5 +200,5 @@ def ill_mesh_forces(
             step, work.lane_motion, work.lane_motion_rates, work.lane_phases, work.speeds[0, lane], rows,
             meshes, work.lane_meshes, work.lane_forces,
         )  # fmt: skip
-        for i in range(meshes.index.shape[0]):
-            forces[meshes.index[i, 0], lane] = work.lane_forces[meshes.index[i, 0]]
+        for i in range(meshes.places.shape[0]):
+            forces[meshes.places[i, 0], lane] = work.lane_forces[meshes.places[i, 0]]

@@ -54,9 +54,9 @@ def make_work(data: Data, drive: Drive, interfaces: int) -> Work:
         known1=np.zeros(data.second.site_index.size),
         inputs=np.zeros(data.first.left_known.shape[0]),
         phases=np.zeros(drive.rates.size),
-        now=np.zeros((data.bearings.index.shape[0], NOW_COLUMNS)),
+        now=np.zeros((data.bearings.places.shape[0], NOW_COLUMNS)),
         jumps=np.zeros((drive.spalls.shape[0], JUMP_COLUMNS)),
-        meshes=np.zeros((data.meshes.index.shape[0], WORK_COLUMNS)),
+        meshes=np.zeros((data.meshes.places.shape[0], WORK_COLUMNS)),
     )
 
 

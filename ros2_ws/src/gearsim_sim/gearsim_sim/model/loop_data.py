@@ -31,7 +31,7 @@ class Part(NamedTuple):
 class Bearings(NamedTuple):
     """Constants of all rolling bearings; balls are padded with cosine and sine zero."""
 
-    index: Indices  # (bearings, 3): interface in x, in y, track of the cage
+    places: Indices  # (bearings, 3): interface in x, in y, track of the cage
     numbers: Array  # (bearings, 3): load factor, clearance, nominal stiffness
     cosines: Array  # (bearings, balls) of the azimuths in the cage's frame
     sines: Array
@@ -62,7 +62,7 @@ class Meshes(NamedTuple):
     A mesh may have a rectangular pulse of stiffness once per tooth phase; its height is 0 if not.
     """
 
-    index: Indices  # (meshes, 6): interface, track, table's offset and points, its `errors` from, to
+    places: Indices  # (meshes, 6): interface, track, table's offset and points, its `errors` from, to
     numbers: Array  # (meshes, 7): mean stiffness, damping, cycles per turn of the track, phase offset,
     # and the pulse: start and width in pitches, height
     errors: Indices  # (errors, 3): track, table's offset and points; those of a mesh are neighbours

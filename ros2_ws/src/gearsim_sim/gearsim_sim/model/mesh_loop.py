@@ -23,18 +23,18 @@ def mesh_forces(
 
     `rates` of the interfaces are zero unless `drive.need_rates`; `work` is (meshes, WORK_COLUMNS).
     """
-    count = meshes.index.shape[0]
+    count = meshes.places.shape[0]
     for i in range(count):
-        track = meshes.index[i, 1]
+        track = meshes.places[i, 1]
         turns = phases[track] * meshes.numbers[i, 2] + meshes.numbers[i, 3]
-        work[i, 0], _ = table_value(turns, meshes.tables, meshes.index[i, 2], meshes.index[i, 3])
+        work[i, 0], _ = table_value(turns, meshes.tables, meshes.places[i, 2], meshes.places[i, 3])
         if meshes.numbers[i, 6] != 0.0:
             length = abs(speed_hz * drive.rates[track] * meshes.numbers[i, 2]) * meshes.step_s
             mean = pulse_mean(turns - meshes.numbers[i, 4], length, meshes.numbers[i, 5])
             work[i, 0] += meshes.numbers[i, 6] * mean
         error = 0.0
         rate = 0.0
-        for j in range(meshes.index[i, 4], meshes.index[i, 5]):
+        for j in range(meshes.places[i, 4], meshes.places[i, 5]):
             track = meshes.errors[j, 0]
             value, slope = table_value(phases[track], meshes.tables, meshes.errors[j, 1], meshes.errors[j, 2])
             error += value
@@ -47,7 +47,7 @@ def mesh_forces(
     add_pulses(step, phases, speed_hz, drive, meshes, work)
     add_terms(step, drive, work)
     for i in range(count):
-        at = meshes.index[i, 0]
+        at = meshes.places[i, 0]
         stiffness = work[i, 0]
         slack = work[i, 3] + work[i, 4]
         if slack == 0.0:

@@ -30,7 +30,7 @@ def bearing_data(plant: Plant, place: NDArray[np.int64]) -> Bearings:
     index = [[place[seat.x], place[seat.y], seat.cage] for seat in seats]
     numbers = [[seat.law.load_factor, seat.law.clearance_m, seat.nominal_stiffness_n_per_m] for seat in seats]
     return Bearings(
-        index=np.array(index, dtype=np.int64).reshape(-1, 3),
+        places=np.array(index, dtype=np.int64).reshape(-1, 3),
         numbers=np.array(numbers, dtype=np.float64).reshape(-1, 3),
         cosines=cosines,
         sines=sines,
@@ -61,7 +61,8 @@ def bearing_memory(bearings: Bearings) -> BearingMemory:
 def mesh_data(plant: Plant, place: NDArray[np.int64], step_s: float) -> Meshes:
     """All meshes; a series that several share is tabled once."""
     store = _Tables()
-    index, errors = [], []
+    index: list[list[int]] = []
+    errors: list[list[int]] = []
     for mesh in plant.meshes:
         first = len(errors)
         errors += [[one.track, *store.put(one.series)] for one in mesh.errors]
@@ -72,7 +73,7 @@ def mesh_data(plant: Plant, place: NDArray[np.int64], step_s: float) -> Meshes:
         for mesh in plant.meshes
     ]
     return Meshes(
-        index=np.array(index, dtype=np.int64).reshape(-1, 6),
+        places=np.array(index, dtype=np.int64).reshape(-1, 6),
         numbers=np.array(numbers, dtype=np.float64).reshape(-1, 7),
         errors=np.array(errors, dtype=np.int64).reshape(-1, 3),
         tables=store.all(),

@@ -38,9 +38,7 @@ class Simulator(Node):
         self._given = given
         self._health = HealthPublisher(self, scenario.machine.name)
         self._health.report("pacing", Level.OK, "compiling")
-        self._publisher = RigPublisher(
-            self, clock=given.publish_clock, torque=bool(scenario.sensors.torques)
-        )
+        self._publisher = RigPublisher(self, clock=given.publish_clock, torque=bool(scenario.sensors.torques))
         self._simulation = Simulation(scenario)
         self._simulation.warm_up()
         self._rig_services = RigServices(self, self._simulation)
