@@ -105,7 +105,9 @@ class Diagnosis:
         ]
         lines += [_finding_line(finding) for finding in self.findings]
         if not self.findings:
-            lines.append("no fault found" if self.judged else "no fault found: nothing could be judged")
+            # Bearings are all that is judged so far: silence about gears must not read as their health.
+            judged = "no bearing fault found (gears, planets and shafts are not judged)"
+            lines.append(judged if self.judged else "no fault found: nothing could be judged")
         return lines
 
 

@@ -141,7 +141,16 @@ def validate(model: type[ModelT], content: Any, where: str, *, require_source: b
             message = "no such key; " + _known_keys(model, first["loc"])
         elif first["type"] == "missing":
             raise InputError(where, place, "nothing", "this key") from None
-        raise InputError(where, place, first["input"], message) from None
+        raise InputError(
+            where, place, _as_written(first["input"]), message.removeprefix("Input should be ")
+        ) from None
+
+
+def _as_written(value: Any) -> Any:
+    """A number with its unit as people write it, anything else as it is."""
+    if isinstance(value, Mapping) and "value" in value:
+        return f"{value['value']} {value.get('unit', '')}".strip()
+    return value
 
 
 def load_yaml(model: type[ModelT], path: Path, *, require_source: bool = False) -> ModelT:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from gearsim_bringup.first_use import tell_first_use
 from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
 from gearsim_bringup.ui import Voice
 
@@ -34,6 +35,7 @@ def command(spec: Path, seconds: float, out: Path, workers: int | None, json_mod
     voice = Voice(json_mode=json_mode)
     loaded = load_ensemble_spec(spec)
     threads = workers or os.cpu_count() or 1
+    tell_first_use(voice)
     began, used = time.monotonic(), time.process_time()
     with voice.progress() as bar:
         task = bar.add_task(f"simulating {len(loaded.variants)} variants", total=seconds)

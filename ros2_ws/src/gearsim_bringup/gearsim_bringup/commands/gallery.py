@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from gearsim_bringup.first_use import tell_first_use
 from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
 from gearsim_bringup.ui import Voice
 
@@ -25,6 +26,7 @@ def command(out: Path, only: tuple[str, ...], seconds: float, json_mode: bool) -
     from gearsim_bringup.gallery.page import make_gallery
 
     voice = Voice(json_mode=json_mode)
+    tell_first_use(voice)
     with voice.progress() as bar:
         task = bar.add_task("gallery", total=1.0)
         files = make_gallery(

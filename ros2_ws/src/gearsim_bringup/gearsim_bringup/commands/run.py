@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from gearsim_bringup.first_use import tell_first_use
 from gearsim_bringup.options import ANY_PATH, POSITIVE, FiniteRange, example
 from gearsim_bringup.ui import Voice
 
@@ -48,7 +49,8 @@ def command(
     source = simulator(str(Path(loaded.source)), end_after=seconds or 0.0, rate=rate, listeners=listeners)
     custom: dict[str, Any] = {"scenario": loaded.name, "seed": str(loaded.seed)}
     with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
-        voice.say(f"scenario {loaded.name}: {loaded.description}")
+        voice.say(f"scenario {loaded.name}: {loaded.description}".rstrip(": "))
+        tell_first_use(voice)
         voice.say("topics under /gearsim; Ctrl-C ends the run")
         try:
             LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth).run()

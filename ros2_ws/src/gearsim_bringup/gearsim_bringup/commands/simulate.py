@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from gearsim_bringup.first_use import tell_first_use
 from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
 from gearsim_bringup.ui import Voice
 
@@ -45,6 +46,7 @@ def command(
     loaded = load_scenario(scenario)
     if seed is not None:
         loaded = dataclasses.replace(loaded, seed=seed)
+    tell_first_use(voice)
     began = time.monotonic()
     with voice.progress() as bar:
         task = bar.add_task(f"simulating {loaded.name}", total=seconds)

@@ -14,8 +14,8 @@ from gearsim_sim.model.faults import REGISTRY
 PAGE = "README.md"
 _HEAD = """# Gallery
 
-One picture for every kind of fault that can be injected: the channel that shows it best, healthy in grey
-and with the fault in red; nothing else differs, and the sensors are ideal. Made by `./gearsim gallery --out
+One picture for every kind of fault that can be injected: the channel that shows it best, in grey without
+it and in red with it; nothing else differs, and the sensors are ideal. Made by `./gearsim gallery --out
 docs/gallery`; each section names the shipped scenario that has the fault (`./gearsim run NAME`). The band
 of the envelope is the one in which the fault adds most; dashed lines are the orders that the nameplate
 predicts for the component.

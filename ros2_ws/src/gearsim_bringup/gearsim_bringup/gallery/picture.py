@@ -31,7 +31,7 @@ def draw(comparison: Comparison, title: str, out: Path) -> None:
 def _waveform(axes: Axes, comparison: Comparison) -> None:
     healthy, faulty = comparison.waveforms
     axes.plot(comparison.time_s, faulty, color=_FAULTY, linewidth=0.6, label="with the fault")
-    axes.plot(comparison.time_s, healthy, color=_HEALTHY, linewidth=0.6, label="healthy")
+    axes.plot(comparison.time_s, healthy, color=_HEALTHY, linewidth=0.6, label="without")
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"{comparison.channel} [{comparison.unit}]")
     axes.margins(x=0)
