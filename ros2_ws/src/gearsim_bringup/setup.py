@@ -36,6 +36,8 @@ setup(
         "click>=8.1",
         "rich>=13",
         "psutil>=5.9",
+        "matplotlib>=3.8",
+        "pydantic>=2",
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",

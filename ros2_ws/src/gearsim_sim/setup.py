@@ -32,6 +32,7 @@ setup(
         "numpy>=1.26",
         "scipy>=1.11",
         "numba>=0.59",
+        "llvmlite>=0.42",
         "pydantic>=2",
         "ruamel.yaml>=0.18",
         f"gearsim_io=={VERSION}",
