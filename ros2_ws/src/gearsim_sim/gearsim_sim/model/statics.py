@@ -13,6 +13,8 @@ _ITERATIONS = 200
 _TOLERANCE = 1e-20
 # A spring added to each bearing in the Newton matrix only, so that a ring without contact is held [N/m].
 _GUARD = 1e4
+_CLEAR_GAIN = 0.5  # a full step that halves the unbalanced forces needs no line search
+_LEAST_FACTOR = 1e-9  # below it the line search has found nothing but rounding
 
 
 def static_equilibrium(
@@ -28,13 +30,23 @@ def static_equilibrium(
     projector = np.eye(size) - modes.rigid_modes @ rigid.T
     external = projector.T @ (system.inputs @ u)
     x = np.zeros(size)
+    gradient, tangent = _gradient_and_tangent(plant, moment, x, external)
     for _ in range(_ITERATIONS):
-        gradient, tangent = _gradient_and_tangent(plant, moment, x, external)
         step = np.linalg.solve(tangent + rigid @ rigid.T * np.trace(tangent) / size, -gradient)
         energy = plant.potential_energy(x, moment)
         if -gradient @ step <= _TOLERANCE * (abs(external @ x) + energy):
             break
-        x = x + _line_search(plant, moment, x, step, external, float(gradient @ step)) * step
+        before = np.linalg.norm(gradient)
+        trial = _gradient_and_tangent(plant, moment, x + step, external)
+        # Close to the end the energy's own rounding hides what a step gains; the forces still show it.
+        if np.linalg.norm(trial[0]) < _CLEAR_GAIN * before:
+            x, (gradient, tangent) = x + step, trial
+            continue
+        factor = _line_search(plant, moment, x, step, external, float(gradient @ step))
+        if factor < _LEAST_FACTOR:
+            break
+        x = x + factor * step
+        gradient, tangent = _gradient_and_tangent(plant, moment, x, external)
     return np.asarray(projector @ x)
 
 
