@@ -326,7 +326,7 @@ def test_simulated_time_from_elsewhere_sets_the_pace(ros_domain):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"scenario": "nope"}, "simulator: scenario: got nope, expected one of demo"),
+        ({"scenario": "nope"}, "simulator: scenario: got nope, expected one of added_structure"),
         ({"scenario": "quick", "batch_samples": 3}, "batch_samples: got 3, expected"),
         ({"scenario": "quick", "end_after": -1.0}, "end_after"),
         ({"rate_factor": "fast"}, "rate_factor: got 'fast', expected a number"),
