@@ -14,13 +14,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, Machine
 from gearsim_io.quantities import Si, validate
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Strict
-from gearsim_sim.params.overrides import override
 from gearsim_sim.params.parts import Drive, Pedestal, Seat
+from gearsim_sim.params.section import read_model_section
 
 MODEL_KIND = "bearing_rig"
 Dofs = Literal[2, 4, 5]
@@ -96,17 +95,9 @@ def load_bearing_rig_params(
         If there is no usable `model` section, a number lacks unit or source, or it contradicts the
         nameplate.
     """
-    plate = load_machine(machine)
-    path, content = read_machine_file(machine)
-    where = f"{path}: model"
-    section = content.get("model")
-    if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
-        found = section.get("kind") if isinstance(section, dict) else section
-        raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine mfpt has it")
-    if overrides:
-        section = override(section, overrides, source or where)
-        where = f"{source or where} (parameters, with {path})"
-    model = validate(BearingRigModel, section, where, require_source=True)
+    read = read_model_section(machine, MODEL_KIND, "mfpt", overrides, source)
+    plate, where = read.plate, read.where
+    model = validate(BearingRigModel, read.content, where, require_source=True)
     params = BearingRigParams(
         where=where, model=model, bearing=_single_bearing(where, plate), shaft=plate.reference_shaft
     )

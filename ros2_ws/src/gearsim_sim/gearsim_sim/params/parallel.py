@@ -16,15 +16,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine
 from gearsim_io.quantities import Si, validate
 from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.model.tooth.stiffness import pair_compliance
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
-from gearsim_sim.params.overrides import override
 from gearsim_sim.params.parts import Drive, Gear, Pedestal, Seat, Shafts, TorsionalEnd
+from gearsim_sim.params.section import read_model_section
 from gearsim_sim.params.teeth import Teeth
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
@@ -206,17 +205,9 @@ def load_parallel_params(
         If there is no usable `model` section, a number lacks unit or source, or it contradicts the
         nameplate.
     """
-    plate = load_machine(machine)
-    path, content = read_machine_file(machine)
-    where = f"{path}: model"
-    section = content.get("model")
-    if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
-        found = section.get("kind") if isinstance(section, dict) else section
-        raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine unsw_parallel has it")
-    if overrides:
-        section = override(section, overrides, source or where)
-        where = f"{source or where} (parameters, with {path})"
-    model = validate(ParallelModel, _with_own_bearings(section), where, require_source=True)
+    read = read_model_section(machine, MODEL_KIND, "unsw_parallel", overrides, source)
+    plate, where = read.plate, read.where
+    model = validate(ParallelModel, _with_own_bearings(read.content), where, require_source=True)
     mesh = _single_mesh(where, plate)
     params = ParallelParams(
         where=where,

@@ -14,13 +14,12 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Bearing, GearMesh, Machine, PlanetaryStage
 from gearsim_io.quantities import Si, validate
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
-from gearsim_sim.params.overrides import override
 from gearsim_sim.params.parts import Drive
+from gearsim_sim.params.section import read_model_section
 
 MODEL_KIND = "planetary"
 
@@ -252,17 +251,9 @@ def load_planetary_params(
         If there is no usable `model` section, a number lacks unit or source, or it contradicts the
         nameplate.
     """
-    plate = load_machine(machine)
-    path, content = read_machine_file(machine)
-    where = f"{path}: model"
-    section = content.get("model")
-    if not isinstance(section, dict) or section.get("kind") != MODEL_KIND:
-        found = section.get("kind") if isinstance(section, dict) else section
-        raise InputError(where, "kind", found, f"{MODEL_KIND}, as machine unsw_planetary has it")
-    if overrides:
-        section = override(section, overrides, source or where)
-        where = f"{source or where} (parameters, with {path})"
-    model = validate(PlanetaryModel, section, where, require_source=True)
+    read = read_model_section(machine, MODEL_KIND, "unsw_planetary", overrides, source)
+    plate, where = read.plate, read.where
+    model = validate(PlanetaryModel, read.content, where, require_source=True)
     stage = _single_stage(where, plate)
     params = PlanetaryParams(
         where=where,
