@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,10 @@ from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.integrate.pieces import circle_table
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop, make_work
-from gearsim_sim.model.loop_data import Data, Part
+from gearsim_sim.model.loop_data import Data, Drive, Part
 from gearsim_sim.model.plant import Moment, Plant, RotatingSite, StateRow
 from gearsim_sim.model.plant_data import bearing_data, bearing_memory, mesh_data
-from gearsim_sim.model.side_data import SidePart
+from gearsim_sim.model.side_data import Side, SidePart
 from gearsim_sim.model.side_state import SideState
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.schedule import Schedule
@@ -159,31 +159,44 @@ class Stepper:
 
     def compile_all(self) -> None:
         """Compile every variant of the loop (or load it), so that no fault on the way has to wait for it."""
-        schedule, accel = self._schedule, np.zeros((self.row_count, 1))
-        drive = schedule.drive()
-        work = make_work(self._data, drive, self._place.size)
-        fluctuates = schedule.profile.fluctuation_nm is not None
-        side = self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
-        motion = np.empty((1, MOTION_COLUMNS + len(self._rows) + self._place.size))
+        drive, side = self._given()
+        accel = np.zeros((self.row_count, 1))
         for loop in self._loops:
-            s0, s1 = (one.copy() for one in self._state)
-            loop(s0, s1, self._data, drive, side, self._memory, work, self.step, 0, accel, 0, motion)
+            self._run(loop, drive, side, tuple(one.copy() for one in self._state), 0, accel, 0)
 
     def advance(self, count: int, accel: Array, column: int) -> Motion:
         """Integrate `count` steps; accelerations go to accel[:, column : column + count]."""
-        width = MOTION_COLUMNS + len(self._rows) + self._place.size
-        motion = np.empty((count // self.oversampling + 1, width))
-        s0, s1 = self._state
+        drive, side = self._given()
+        loop = self._loops[2 if side.active else drive.need_rates]
+        motion = self._run(loop, drive, side, self._state, count, accel, column)
+        self.step += count
+        return self._unpack(motion.T)
+
+    def _given(self) -> tuple[Drive, Side]:
+        """What the schedule prescribes from the present step on."""
         schedule = self._schedule
         drive = schedule.drive()
-        work = make_work(self._data, drive, self._place.size)
         fluctuates = schedule.profile.fluctuation_nm is not None
-        side = self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
-        samples = self._loops[2 if side.active else drive.need_rates](
-            s0, s1, self._data, drive, side, self._memory, work, self.step, count, accel, column, motion
+        return drive, self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
+
+    def _run(
+        self,
+        loop: Callable[..., int],
+        drive: Drive,
+        side: Side,
+        state: tuple[Array, ...],
+        count: int,
+        accel: Array,
+        column: int,
+    ) -> Array:
+        """Let a variant of the loop move `state`; returns its rows at the output samples."""
+        width = MOTION_COLUMNS + len(self._rows) + self._place.size
+        motion = np.empty((count // self.oversampling + 1, width))
+        work = make_work(self._data, drive, self._place.size)
+        samples = loop(
+            *state, self._data, drive, side, self._memory, work, self.step, count, accel, column, motion
         )
-        self.step += count
-        return self._unpack(motion[:samples].T)
+        return motion[:samples]
 
     def _unpack(self, columns: Array) -> Motion:
         """Angles from the turns since the anchor and the twist of the encoders, signals, probes."""

@@ -47,14 +47,18 @@ def stiffness_series(mesh: MeshStiffness, *, variation: bool) -> PeriodicSeries:
     is `pair_stiffness_ratio` times as stiff. The mean is kept. Lanczos factors let the series end
     without overshoot, as tip relief rounds the take-over.
     """
-    double = mesh.contact_ratio - 1
     mean, ratio = mesh.mean_stiffness_n_per_m, mesh.pair_stiffness_ratio
-    single_stiffness = mean / (1 + (ratio - 1) * double)
-    orders = np.arange(1, int(mesh.harmonics) + 1) if variation else np.zeros(0, dtype=np.int64)
-    step = (ratio - 1) * single_stiffness
-    cosine = step * 2 * np.sin(np.pi * orders * double) / (np.pi * orders)
-    cosine *= np.sinc(orders / (int(mesh.harmonics) + 1))
-    return PeriodicSeries(mean=mean, orders=orders, cosine=cosine, sine=np.zeros_like(cosine))
+    return two_pair_stiffness(mean, ratio, mesh.contact_ratio, int(mesh.harmonics) if variation else 0)
+
+
+def two_pair_stiffness(mean_n_per_m: float, ratio: float, contact: float, harmonics: int) -> PeriodicSeries:
+    """The same from mean, stiffness of two pairs over one, contact ratio and number of lines."""
+    double = contact - 1
+    single = mean_n_per_m / (1 + (ratio - 1) * double)
+    orders = np.arange(1, harmonics + 1)
+    cosine = (ratio - 1) * single * 2 * np.sin(np.pi * orders * double) / (np.pi * orders)
+    cosine = cosine * np.sinc(orders / (harmonics + 1))
+    return PeriodicSeries(mean=mean_n_per_m, orders=orders, cosine=cosine, sine=np.zeros_like(cosine))
 
 
 @dataclass(frozen=True, eq=False)

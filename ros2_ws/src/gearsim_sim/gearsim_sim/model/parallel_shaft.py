@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 from gearsim_sim.model.assembly import Assembly, LinearSystem, Vector
-from gearsim_sim.model.ball_bearing import BallBearing, make_ball_bearing
 from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.gear_errors import gear_error
 from gearsim_sim.model.gear_mesh import Mesh, MeshError, add_mesh, mesh_direction
@@ -23,6 +22,7 @@ from gearsim_sim.model.parallel_places import parallel_mounts, parallel_shafts
 from gearsim_sim.model.pedestal import add_pedestal
 from gearsim_sim.model.plant import BASE_INPUTS, Limits, Plant, StateRow, Track
 from gearsim_sim.model.ring import Ring
+from gearsim_sim.model.rolling_bearing import RollingBearing, make_rolling_bearing
 from gearsim_sim.model.shaft import bending_link, torsion_link
 from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.params.parallel import BEARINGS, ParallelModel, ParallelParams
@@ -87,7 +87,7 @@ def _coupling(end: TorsionalEnd, first: str, second: str) -> StateRow:
     return StateRow({first: stiffness, second: -stiffness}, {first: damping, second: -damping})
 
 
-def _tracks(params: ParallelParams, laws: tuple[BallBearing, ...]) -> tuple[Track, ...]:
+def _tracks(params: ParallelParams, laws: tuple[RollingBearing, ...]) -> tuple[Track, ...]:
     """Both shafts, turning positively, then the cages and the spin of their balls, counter-clockwise."""
     ratios = (1.0, params.speed_ratio)
     shafts = (Track(params.input_shaft, ratios[INPUT]), Track(params.output_shaft, ratios[OUTPUT]))
@@ -135,9 +135,9 @@ def _mesh(params: ParallelParams, curve: StiffnessCurve, system: LinearSystem, s
     )
 
 
-def _bearing_laws(params: ParallelParams) -> tuple[BallBearing, ...]:
+def _bearing_laws(params: ParallelParams) -> tuple[RollingBearing, ...]:
     return tuple(
-        make_ball_bearing(
+        make_rolling_bearing(
             plate,
             own,
             load_direction_rad=LOAD_DIRECTION_RAD[i],
@@ -149,7 +149,7 @@ def _bearing_laws(params: ParallelParams) -> tuple[BallBearing, ...]:
     )
 
 
-def _seat(params: ParallelParams, system: LinearSystem, number: int, law: BallBearing) -> BearingSeat:
+def _seat(params: ParallelParams, system: LinearSystem, number: int, law: RollingBearing) -> BearingSeat:
     shaft = BEARING_SHAFT[number]
     return BearingSeat(
         name=BEARINGS[number],
@@ -164,7 +164,7 @@ def _seat(params: ParallelParams, system: LinearSystem, number: int, law: BallBe
     )
 
 
-def _check_load_zones(params: ParallelParams, bearings: tuple[BallBearing, ...]) -> None:
+def _check_load_zones(params: ParallelParams, bearings: tuple[RollingBearing, ...]) -> None:
     """Under the nominal load each bearing must rest on more than a single ball at a time."""
     model = params.model
     load_n = model.drive.load_nm / model.gear.base_radius_m / 2

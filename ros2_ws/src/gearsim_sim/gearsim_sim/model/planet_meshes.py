@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_sim.model.gear_errors import normal_draws, pitch_series, surface_series
-from gearsim_sim.model.gear_mesh import Mesh, MeshError
+from gearsim_sim.model.gear_mesh import Mesh, MeshError, two_pair_stiffness
 from gearsim_sim.model.periodic import PeriodicSeries, merged
 from gearsim_sim.model.planet_geometry import RING, SUN, StageGeometry
 from gearsim_sim.model.planetary import mean_stiffness, mesh_name
@@ -49,23 +49,12 @@ def reversed_series(series: PeriodicSeries) -> PeriodicSeries:
     return PeriodicSeries(series.mean, series.orders, series.cosine, -series.sine)
 
 
-def two_pair_stiffness(mean_n_per_m: float, ratio: float, contact: float, harmonics: int) -> PeriodicSeries:
-    """Mesh stiffness over the phase from the middle of double contact; see `gear_mesh.stiffness_series`."""
-    double = contact - 1
-    single = mean_n_per_m / (1 + (ratio - 1) * double)
-    orders = np.arange(1, harmonics + 1)
-    cosine = (ratio - 1) * single * 2 * np.sin(np.pi * orders * double) / (np.pi * orders)
-    cosine = cosine * np.sinc(orders / (harmonics + 1))
-    return PeriodicSeries(mean_n_per_m, orders, cosine, np.zeros_like(cosine))
-
-
 def mesh_stiffness(params: PlanetaryParams, geometry: StageGeometry, side: int) -> PeriodicSeries:
     """Stiffness [N/m] of the meshes of one side over their phase, which is whole at the pitch point."""
     mesh = params.model.mesh
     mean, contact = mean_stiffness(params, geometry, side), geometry.contacts[side]
     if not params.physics.mesh_stiffness_variation:
-        empty = np.zeros(0)
-        return PeriodicSeries(mean, np.zeros(0, dtype=np.int64), empty, empty)
+        return two_pair_stiffness(mean, 1.0, contact.ratio, 0)
     if mesh.potential_energy:
         found = stiffness_series(geometry.pair(side), int(mesh.harmonics))
         shape = scaled(found, mean / found.mean)

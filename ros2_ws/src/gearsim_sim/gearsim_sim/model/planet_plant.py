@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.bearing_seat import BearingSeat
 from gearsim_sim.model.first_stage import INTERFACE, first_stage_contact_ratio, first_stage_rigid, teeth_of
-from gearsim_sim.model.gear_mesh import Mesh, MeshError
+from gearsim_sim.model.gear_mesh import Mesh, MeshError, two_pair_stiffness
 from gearsim_sim.model.planet_geometry import StageGeometry, make_geometry
-from gearsim_sim.model.planet_meshes import make_meshes, two_pair_stiffness, wheel_error
+from gearsim_sim.model.planet_meshes import make_meshes, wheel_error
 from gearsim_sim.model.planet_wheels import planetary_wheels
 from gearsim_sim.model.planetary import assemble, rigid_vector
 from gearsim_sim.model.plant import Limits, Plant, RotatingSite, Track
