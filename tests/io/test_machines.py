@@ -10,6 +10,8 @@ from ruamel.yaml import YAML
 
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, machine_file, machine_names
+from gearsim_io.nameplate import PlanetaryStage
+from gearsim_io.planetary import check_assembly
 
 NAMES = (
     "cwru_drive_end",
@@ -305,3 +307,33 @@ def test_the_hunting_design_has_no_common_factors():
     assert [math.gcd(a, b) for a, b in zip(teeth, teeth[1:] + teeth[:1], strict=True)] == [1, 1, 1]
     usual = load_machine("unsw_planetary").planetary_stages[0]
     assert stage.sun_teeth + stage.planet_teeth == usual.sun_teeth + usual.planet_teeth
+
+
+def test_hunting_planets_stand_where_their_teeth_fit():
+    """41/20/81 cannot be spaced equally by three; 120 deg is refused with the place beside it that fits."""
+
+    def check(sun, ring, angles):
+        stage = PlanetaryStage(
+            name="stage",
+            carrier_shaft="carrier",
+            sun_shaft="sun",
+            ring_shaft="",
+            planet_shaft="planet",
+            input_member="carrier",
+            sun_teeth=sun,
+            ring_teeth=ring,
+            planet_teeth=20,
+            planet_angles_rad=tuple(angles),
+        )
+        check_assembly(stage, "machine", "stage")
+
+    thirds = [2 * math.pi * k / 3 for k in range(3)]
+    check(40, 80, thirds)
+    with pytest.raises(InputError, match="81, the sun's teeth") as error:
+        check(41, 80, thirds)
+    assert error.value.field == "stage.ring_teeth"
+    with pytest.raises(InputError, match=r"120\.984 deg for planet 2"):
+        check(41, 81, thirds)
+    check(41, 81, [0.0, 2 * math.pi * 41 / 122, 2 * math.pi * 81 / 122])
+    with pytest.raises(InputError, match="clear of each other"):
+        check(40, 80, [2 * math.pi * k / 10 for k in range(10)])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from gearsim_io.errors import InputError
-from gearsim_sim.model.tooth.assembly import check_planetary_assembly, equal_spacing_possible
 from gearsim_sim.model.tooth.contact_ratio import contact_ratio_external, contact_ratio_internal
 from gearsim_sim.model.tooth.gear import SpurGear
 from gearsim_sim.model.tooth.outline import tooth_outline, tooth_root
@@ -153,18 +152,3 @@ def test_impossible_pairs_are_refused():
     big = SpurGear(60, 2e-3, 0.02, 20e-3)
     wrong(lambda: GearPair(big, replace(RING, teeth=66)), "foul", "6 teeth")
     assert GearPair(big, replace(RING, teeth=70)).contact_ratio > 1
-
-
-def test_planetary_assembly():
-    tip = 22 / 60
-    thirds = [0.0, 2 * math.pi / 3, 4 * math.pi / 3]
-    check_planetary_assembly("machine", 40, 20, 80, thirds, tip)
-    assert equal_spacing_possible(40, 80, 3)
-    wrong(lambda: check_planetary_assembly("machine", 41, 20, 80, thirds, tip), "ring_teeth", "81")
-    hunting = [0.0, math.radians(120), math.radians(240)]
-    wrong(lambda: check_planetary_assembly("m", 41, 20, 81, hunting, tip), "planet 2", "120.984")
-    assert not equal_spacing_possible(41, 81, 3)
-    fitting = [0.0, 2 * math.pi * 41 / 122, 2 * math.pi * 81 / 122]
-    check_planetary_assembly("machine", 41, 20, 81, fitting, 22 / 61)
-    crowd = [2 * math.pi * k / 10 for k in range(10)]
-    wrong(lambda: check_planetary_assembly("machine", 40, 20, 80, crowd, tip), "planet angles", "43.02")
