@@ -385,14 +385,33 @@ def test_series_helpers():
 # Contact law
 
 
-@pytest.mark.parametrize("law", [ToothContact(20e-6), ToothContact(20e-6, 8e-6), ToothContact(0.0, 8e-6)])
+LAWS = [ToothContact(20e-6), ToothContact(20e-6, 8e-6), ToothContact(0.0, 8e-6), ToothContact(7e-6, 8e-6)]
+
+
+@pytest.mark.parametrize("law", LAWS)
 def test_contact_force_is_the_slope_of_an_energy(law):
     d = np.linspace(-60e-6, 40e-6, 4001)
     step = 1e-10
     slope = [(law.energy(x + step) - law.energy(x - step)) / (2 * step) for x in d]
     assert slope == pytest.approx([law.elastic(x) for x in d], abs=1e-10)
     assert np.abs(np.diff([law.elastic(x) for x in d])).max() <= 1.01 * (d[1] - d[0])  # continuous
-    assert law.elastic(-law.backlash_m / 2) == 0.0
+    assert (law.elastic(-law.backlash_m / 2) == 0.0) == (law.backlash_m in (0.0, 20e-6))
+
+
+def test_a_growing_play_begins_with_the_law_of_a_mesh_without_any():
+    """Force and damper differ from a plain spring by an amount in proportion to the play, in any state."""
+    rng = np.random.default_rng(1)
+    states = list(zip(rng.uniform(-60e-6, 60e-6, 500), rng.normal(size=500) * 0.1, strict=True))
+
+    def worst(law):
+        plain = [3e8 * d + 2594.0 * v for d, v in states]
+        return max(abs(law.force(d, v, 3e8, 2594.0) - one) for (d, v), one in zip(states, plain, strict=True))
+
+    for gap in (0.0, 1e-9):
+        effects = [worst(ToothContact(play, gap)) for play in (1e-7, 1e-6, 2e-5)]
+        assert effects[0] < 0.01 * effects[2]
+        assert effects[1] < 0.1 * effects[2]
+    assert worst(ToothContact()) < 1e-9
 
 
 def test_contact_never_pulls_and_its_damper_dissipates():
@@ -409,15 +428,15 @@ def test_contact_never_pulls_and_its_damper_dissipates():
 
 
 def test_a_face_is_a_row_of_springs():
-    """Against 4000 strips that touch one after the other."""
+    """Against 4000 strips that touch one after the other, with play and without."""
     law = ToothContact(5e-6, 8e-6)
     strips = (np.arange(4000) + 0.5) / 4000 * 8e-6
     for d in (1e-6, 7.9e-6, 8.1e-6, 3e-5, -2e-6, -9e-6, -3e-5):
-        depth = (d if d > 0 else -d - 5e-6) - strips
-        sign = 1 if d > 0 else -1
-        assert law.elastic(d) == pytest.approx(sign * np.maximum(0, depth).mean(), abs=1e-12)
-        assert law.touching(d) == pytest.approx(np.mean(depth > 0), abs=1e-3)
-        assert law.slope(d) == pytest.approx(np.mean(depth > 0), abs=1e-3)
+        held, free = abs(d) - strips, (d if d > 0 else -d - 5e-6) - strips
+        force = 0.75 * np.maximum(0, held).mean() + 0.25 * np.maximum(0, free).mean()  # 5 of 20 um
+        assert law.elastic(d) == pytest.approx(np.sign(d) * force, abs=1e-12)
+        slope = 0.75 * np.mean(held > 0) + 0.25 * np.mean(free > 0)
+        assert law.slope(d) == pytest.approx(slope, abs=1e-3)
 
 
 def test_no_play_is_a_plain_spring():
@@ -427,4 +446,4 @@ def test_no_play_is_a_plain_spring():
         assert law.energy(d) == d**2 / 2
     # A lead error costs half its gap once the whole face touches.
     assert ToothContact(0.0, 4e-6).elastic(10e-6) == pytest.approx(8e-6)
-    assert ToothContact(0.0, 4e-6).touching(1e-6) == 0.25
+    assert ToothContact(0.0, 4e-6).slope(1e-6) == 0.25

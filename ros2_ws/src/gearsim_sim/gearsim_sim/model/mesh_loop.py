@@ -8,6 +8,7 @@ from gearsim_sim.integrate.compiled import inlined
 from gearsim_sim.integrate.pieces import table_value
 from gearsim_sim.model.bearing_loop import severity
 from gearsim_sim.model.loop_data import Array, Drive, Meshes
+from gearsim_sim.model.tooth.contact import FREE_PLAY_M
 
 _OWN = 4  # first column behind those of the severity
 # Columns of `work`: stiffness, transmission error, its rate per turn and second, backlash, lead gap.
@@ -127,13 +128,21 @@ def tooth_force(
 ) -> float:
     """Force of teeth that can part; the readable twin is `tooth.contact.ToothContact.force`."""
     sense = 1.0 if d > 0.0 else -1.0
-    depth = d if d > 0.0 else -d - backlash
-    if depth <= 0.0:
-        return 0.0
-    touching = 1.0
-    elastic = stiffness * (depth - 0.5 * gap)
-    if depth < gap:
-        touching = depth / gap
-        elastic = stiffness * 0.5 * depth * touching
+    parting = min(1.0, backlash / FREE_PLAY_M)
+    force = 0.0
+    if parting < 1.0:
+        touching, elastic = flank(abs(d), stiffness, gap)
+        force = (1.0 - parting) * (sense * elastic + damping * touching * rate)
+    touching, elastic = flank(d if d > 0.0 else -d - backlash, stiffness, gap)
     damper = damping * touching * sense * rate
-    return sense * (elastic + max(-elastic, min(elastic, damper)))
+    return force + parting * sense * (elastic + max(-elastic, min(elastic, damper)))
+
+
+@inlined
+def flank(depth: float, stiffness: float, gap: float) -> tuple[float, float]:
+    """Touching part of the face, and elastic force, of flanks pressed `depth` beyond touch."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    if depth < gap:
+        return depth / gap, stiffness * 0.5 * depth * (depth / gap)
+    return 1.0, stiffness * (depth - 0.5 * gap)

@@ -13,6 +13,8 @@ _ITERATIONS = 200
 _TOLERANCE = 1e-20
 # A spring added to each bearing in the Newton matrix only, so that a ring without contact is held [N/m].
 _GUARD = 1e4
+# The same for teeth that do not touch: the least part of its mean that the stiffness of a mesh has there.
+_MESH_GUARD = 1e-3
 _CLEAR_GAIN = 0.5  # a full step that halves the unbalanced forces needs no line search
 _LEAST_FACTOR = 1e-9  # below it the line search has found nothing but rounding
 
@@ -57,6 +59,9 @@ def _gradient_and_tangent(
     force, tangent = plant.static_interface(system.interfaces.T @ x, moment)
     guarded = [index for seat in plant.bearings for index in (seat.x, seat.y)]
     tangent[guarded, guarded] += _GUARD
+    for mesh in plant.meshes:
+        least = (_MESH_GUARD - 1) * mesh.mean_stiffness_n_per_m  # the linear part has the mean
+        tangent[mesh.interface, mesh.interface] = max(tangent[mesh.interface, mesh.interface], least)
     gradient = system.stiffness @ x + system.interfaces @ force - external
     return gradient, system.stiffness + system.interfaces @ tangent @ system.interfaces.T
 
