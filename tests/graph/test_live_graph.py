@@ -70,9 +70,10 @@ def test_run_ends_with_ctrl_c_and_leaves_a_sound_bag(ros_domain, tmp_path):
 def test_a_second_rig_in_the_same_domain_is_refused(ros_domain, tmp_path):
     first = ros_domain.start_node("gearsim_sim.nodes.simulator", {"scenario": "quick"})
     first.wait_for("scenario quick", timeout_s=200)  # it may have to compile first
-    source = simulator("quick", end_after=1.0, rate=1.0, listeners=0)
+    source = simulator("quick", end_after=20.0, rate=1.0, listeners=len(MONITORS) + 1)
     with pytest.raises(InputError, match="/gearsim/accel: publishers: got one already"):
-        LiveRun(source, tmp_path / "log").run()
+        LiveRun(source, tmp_path / "log", tmp_path / "bag").run()
+    assert not (tmp_path / "bag").exists()
 
 
 def test_bad_parameters_of_a_node_are_passed_on_in_its_words(ros_domain, tmp_path):
