@@ -1,14 +1,18 @@
 """The gallery shows every kind of fault, each by a difference that the fault alone makes."""
 
+from itertools import combinations
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from gearsim_bringup.gallery.analysis import compare
 from gearsim_bringup.gallery.cases import cases, faults_of
+from gearsim_bringup.gallery.marks import mark_orders
 from gearsim_bringup.gallery.page import make_gallery
+from gearsim_dsp.kinematics import FaultFamily
 from gearsim_io.errors import InputError
 from gearsim_sim.model.faults import REGISTRY
 
@@ -59,6 +63,25 @@ def test_pictures_are_drawn_and_show_both_records(outer, tmp_path):
     grey = (np.abs(pixels - 0x8A / 255) < 0.05).all(axis=2)
     assert red.sum() > 500
     assert grey.sum() > 500
+
+
+@pytest.mark.parametrize(
+    "orders", [(0.408, 4.89, 5.222, 7.11), (0.398, 3.585, 4.713, 5.415), (21.7, 24.2, 24.6)]
+)
+def test_names_of_orders_do_not_overlap(orders):
+    """Those of two shipped bearings, and some at the end of the axis."""
+    axes = Figure(figsize=(11, 6.2), dpi=80).subplot_mosaic([["above", "above"], ["left", "right"]])["right"]
+    axes.plot([0, 25], [0, 1])
+    axes.set(xlim=(0, 25), ylim=(0, 1))
+    mark_orders(axes, [FaultFamily("b", "outer_race", order, 0.0, "2xBSF", 0.01) for order in orders])
+    frame = axes.get_window_extent()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) == len(orders)
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
+    for box in boxes:
+        assert frame.x0 < box.x0 < box.x1 < frame.x1
+        assert axes.transData.transform((0, 1))[1] < box.y0  # above the curves
 
 
 def test_unknown_kinds_are_named():

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearsim_bringup.gallery.analysis import Comparison
+from gearsim_bringup.gallery.marks import mark_orders
 
-_HEALTHY, _FAULTY, _MARK = "#8a8a8a", "#c0392b", "#2c6fbb"
+_HEALTHY, _FAULTY = "#8a8a8a", "#c0392b"
 _LOWEST_HZ = 1.0
 _DPI = 80
 
@@ -57,15 +58,10 @@ def _envelope(axes: Axes, comparison: Comparison) -> None:
     shown = comparison.orders > 0.05
     for power, colour in zip(comparison.envelopes[::-1], (_FAULTY, _HEALTHY), strict=True):
         axes.plot(comparison.orders[shown], 2 * np.sqrt(power[shown]), color=colour, linewidth=0.8)
-    for family in comparison.families:
-        axes.axvline(family.order, color=_MARK, linestyle="--", linewidth=0.7)
-        axes.annotate(
-            family.label, (family.order, 0.98), xycoords=("data", "axes fraction"), color=_MARK, fontsize=8,
-            rotation=90, va="top", ha="right",
-        )  # fmt: skip
     low, high = (edge / 1e3 for edge in comparison.band_hz)
     axes.set_xlabel("order of the reference shaft")
     axes.set_ylabel("modulation of the squared envelope")
     axes.set_title(f"squared envelope spectrum of {low:.3g} to {high:.3g} kHz", fontsize=9)
     axes.set_xlim(0, comparison.orders[-1])
     axes.set_ylim(bottom=0)
+    mark_orders(axes, comparison.families)
