@@ -36,6 +36,7 @@ COMMANDS = {
     "view": "view",
     "bench": "bench",
     "gallery": "gallery",
+    "figures": "figures",
     "parameters": "parameters",
     "data": "data",
 }

@@ -1,0 +1,7 @@
+"""Pictures of the methods at work on measured records, one module per picture with `draw(records)`.
+
+`FIGURES` is the registry: a name in it is the module here, the picture `<name>.png` and the page
+`docs/methods/<name>.md` that shows it.
+"""
+
+FIGURES: tuple[str, ...] = ("squared_envelope_spectrum",)
