@@ -28,6 +28,7 @@ setup(
     install_requires=[
         "numpy>=1.26",
         "scipy>=1.11",
+        "numba>=0.59",
         f"gearsim_io=={VERSION}",
     ],
     zip_safe=False,

@@ -1,0 +1,1 @@
+"""Angles of shafts: from tacho, encoder or the vibration itself, and signals sampled by angle."""
