@@ -375,7 +375,7 @@ def test_channels_that_do_not_go_together(tmp_path, variables, section, words):
 @pytest.mark.parametrize(
     ("section", "words"),
     [
-        ({"rates": {}}, "rates: got {}, expected no such key; one of channels, load, rate, speed"),
+        ({"rates": {}}, "got rates, expected one of the keys channels, load, rate, speed"),
         ({"rate": {"value": 1000}}, "rate.value: got 1000"),
         ({"rate": {"value": number(1000, "kg")}}, "not kg"),
         ({"rate": {"file_name": "no group"}}, "one group in parentheses"),

@@ -147,11 +147,16 @@ def test_units_become_si(tmp_path):
     ("place", "value", "field", "words"),
     [
         ("name", None, "name", "this key"),
-        ("color", "red", "color", "no such key"),
+        ("color", "red", "color", "one of the keys"),
         ("nameplate/shafts", {}, "nameplate.shafts", "at least 1"),
         ("nameplate/reference_shaft", "motor", "nameplate.reference_shaft", "one of the shafts in, out"),
         ("nameplate/bearings/b1/shaft", "x", "nameplate.bearings.b1.shaft", "one of the shafts in, out"),
-        ("nameplate/bearings/b1/channels", ["z"], "nameplate.bearings.b1.channels.0", "channels a"),
+        (
+            "nameplate/bearings/b1/channels",
+            ["z"],
+            "b1.channels (entry 1 of 1)",
+            "channels a",
+        ),
         ("nameplate/bearings/b1/rolling_elements", number(2), "rolling_elements", ">= 3"),
         ("nameplate/bearings/b1/rolling_elements", number(9.5), "rolling_elements", "a whole number"),
         ("nameplate/bearings/b1/rolling_elements", number(16), "rolling_elements", "fit on a pitch circle"),
@@ -178,8 +183,8 @@ def test_units_become_si(tmp_path):
         ("nameplate/shafts/in", {"ratio": number(2)}, "nameplate.shafts.in.ratio", "the reference shaft"),
         ("nameplate/shafts/lost", {}, "nameplate.shafts.lost.ratio", "no gear mesh joins"),
         ("nameplate/shafts/in", {"nominal_speed": number(-5, "Hz")}, "nominal_speed", "> 0"),
-        ("nameplate/tacho_shafts", ["x"], "nameplate.tacho_shafts.0", "one of the shafts"),
-        ("nameplate/encoder_shafts", ["x"], "nameplate.encoder_shafts.0", "one of the shafts"),
+        ("nameplate/tacho_shafts", ["x"], "nameplate.tacho_shafts (entry 1 of 1)", "one of the shafts"),
+        ("nameplate/encoder_shafts", ["x"], "nameplate.encoder_shafts (entry 1 of 1)", "one of the shafts"),
         ("nameplate/speed_tolerance", number(1.5), "speed_tolerance", "< 1"),
     ],
 )
@@ -197,7 +202,7 @@ def test_bad_descriptions_are_named(tmp_path, place, value, field, words):
 def test_unreadable_files_are_named(tmp_path):
     broken = tmp_path / "broken.yaml"
     broken.write_text("name: [")
-    with pytest.raises(InputError, match="valid YAML"):
+    with pytest.raises(InputError, match=r"broken.yaml: line 1, column 8: got the end of the file"):
         load_machine(broken)
     listed = tmp_path / "list.yaml"
     listed.write_text("- 1\n- 2\n")

@@ -285,7 +285,7 @@ def test_load_noise_moves_the_machine_and_its_rms_is_as_asked(params):
 
 def test_structure_of_unknown_sites_is_refused(params):
     path = {"from": "b3_y", "to": "b9_y", "mass": "1 kg", "frequency": "900 Hz", "damping_ratio": 0.1}
-    with pytest.raises(InputError, match=r"structure.paths.0.to: got b9_y"):
+    with pytest.raises(InputError, match=r"structure\.paths \(entry 1 of 1\)\.to: got b9_y"):
         engine(params, structure={"paths": [path]})
     with pytest.raises(InputError, match="another site"):
         engine(params, structure={"paths": [{**path, "to": "b3_y"}]})

@@ -118,5 +118,5 @@ def test_what_the_machine_cannot_do_names_the_scenario(tmp_path):
     path.write_text(
         "operating_point: {speed: 10 Hz, load: 50 N*m}\ntimeline: [{at: 1 s, clear: {id: ghost}}]\n"
     )
-    with pytest.raises(InputError, match=r"bad\.yaml: event 1 of the timeline: .*ghost"):
+    with pytest.raises(InputError, match=r"bad\.yaml: timeline, at 1 s: .*ghost"):
         Simulation(load_scenario(path))

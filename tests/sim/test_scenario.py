@@ -105,7 +105,7 @@ def test_full_scale_is_not_known_without_a_range(tmp_path):
 
 
 BAD = [
-    ("speed: 10 Hz", "speed: got 10 Hz, expected no such key; one of batch_samples, description, faults, "),
+    ("speed: 10 Hz", "got speed, expected one of the keys batch_samples, description, faults, "),
     ("model: lpm99", "model: got lpm99, expected one of bearing2, "),
     ("seed: -1", "seed: got -1, expected "),
     ("sample_rate: 65536", "sample_rate: got 65536, expected a number in Hz, >= 1000 and <= 2e+06 (the unit"),
@@ -116,38 +116,44 @@ BAD = [
     ("batch_samples: 60000", "batch_samples: got 60000, expected at most 15000, so that a message of 8"),
     ("batch_samples: many", "batch_samples: got many, expected "),
     ("rate_factor: -2", "rate_factor: got -2, expected a number without unit, >= 0"),
-    ("faults: [{kind: x, component: y}]", "faults.0: kind: got x, expected one of ball_waviness, "),
+    (
+        "faults: [{kind: x, component: y}]",
+        "(entry 1 of 1): kind: got x, expected one of ball_waviness, ",
+    ),
     (
         "faults: [{kind: outer_race_spall, component: bearing_1, params: {width: 1 mm}}]",
-        "faults.0: width: got 1 mm, expected no such key; one of depth_m, geometry, position_rad, row, "
-        "width_m",
+        "faults (entry 1 of 1): got width, expected one of the keys depth_m, geometry, position_rad, row, "
+        "width_m; did you mean width_m?",
     ),
     (
         "timeline: [{at: 1 s, inject: {kind: outer_race_spall, component: b, params: {width_m: 1 V}}}]",
-        "timeline.0.inject: width_m: got 1 V, expected a number in m, > 0 (not V)",
+        "timeline (entry 1 of 1).inject: width_m: got 1 V, expected a number in m, > 0 (not V)",
     ),
-    ("faults: [{kind: x}]", "faults.0.component: got nothing, expected this key"),
+    ("faults: [{kind: x}]", "faults (entry 1 of 1).component: got nothing, expected this key"),
     (
         "faults: [{kind: x, component: y, size: 3}]",
-        "faults.0.size: got 3, expected no such key; one of component, id, ",
+        "faults (entry 1 of 1): got size, expected one of the keys component, id, ",
     ),
-    ("faults: [{kind: x, component: y, severity: 3}]", "faults.0.severity: got 3, expected"),
+    ("faults: [{kind: x, component: y, severity: 3}]", "faults (entry 1 of 1).severity: got 3, expected"),
     (
         "timeline: [{at: 1 s, set: {sped: 1}}]",
-        "set.sped: got 1, expected no such key; one of load, ramp, speed",
+        "set: got sped, expected one of the keys load, ramp, speed; did you mean speed?",
     ),
     (
         "sensors: {accelerometers: {each: {b1_x: {r: 2}}}}",
-        "each.b1_x.r: got 2, expected no such key; one of adc_",
+        "each.b1_x: got r, expected one of the keys adc_",
     ),
-    ("timeline: [{at: 8, clear: {}}]", "timeline.0.at: got 8, expected a number in s"),
-    ("timeline: [{at: -1 s, clear: {}}]", "timeline.0.at: got -1 s, expected a number in s, >= 0"),
+    ("timeline: [{at: 8, clear: {}}]", "timeline (entry 1 of 1).at: got 8, expected a number in s"),
+    (
+        "timeline: [{at: -1 s, clear: {}}]",
+        "timeline (entry 1 of 1).at: got -1 s, expected a number in s, ",
+    ),
     ("timeline: [{at: 1 s}]", "expected one of inject, set, clear beside at"),
     ("timeline: [{at: 1 s, clear: {}, set: {}}]", "expected one of inject, set, clear beside at"),
-    ("timeline: [{at: 1 s, set: {speed: -1 Hz}}]", "timeline.0.set.speed: got -1 Hz, expected"),
+    ("timeline: [{at: 1 s, set: {speed: -1 Hz}}]", "timeline (entry 1 of 1).set.speed: got -1 Hz, expected"),
     ("sensors: {accelerometers: {chain: gold}}", "sensors.accelerometers.chain: got gold, expected one of"),
-    ("seed: 1\nseed: 2", "expected valid YAML"),
-    ("model: [", "expected valid YAML"),
+    ("seed: 1\nseed: 2", 'got duplicate key "seed", expected valid YAML'),
+    ("model: [", "line 4, column 9: got the end of the file, expected a value"),
 ]
 
 

@@ -295,7 +295,7 @@ def test_every_shipped_chain_measures(name, rate):
         ),
         (
             {"accelerometers": {"all": {"drift": {"rms": "1 m/s^2", "tau": 1}}}},
-            "no such key; one of rms, time",
+            "one of the keys rms, time",
         ),
         (
             {"accelerometers": {"each": {"p": {"site": {"q": "x"}}}}},
@@ -306,7 +306,7 @@ def test_every_shipped_chain_measures(name, rate):
             {"tachos": {"each": {"output": {"jitter": "1 us"}}}},
             "tachos: each: got output, expected one of input",
         ),
-        ({"tachos": {"each": {"input": {"jiter": "1 us"}}}}, "no such key; one of clock, coupling, delay"),
+        ({"tachos": {"each": {"input": {"jiter": "1 us"}}}}, "one of the keys clock, coupling, delay"),
         (
             {"torques": {"shafts": ["rear"]}},
             "sensors.torques: shafts: got rear, expected one of input, output",
@@ -317,7 +317,7 @@ def test_every_shipped_chain_measures(name, rate):
             {"torques": {"shafts": ["input"], "all": {"temperature": "off"}}},
             "zero_per_k of input_torque: got 0.02, expected a temperature beside it",
         ),
-        ({"microphones": {}}, "no such key; one of accelerometers, encoders, tachos, torques"),
+        ({"microphones": {}}, "one of the keys accelerometers, encoders, tachos, torques"),
     ],
 )
 def test_bad_tables_are_told_in_one_line(content, message):

@@ -249,8 +249,9 @@ def test_mistakes_are_told_before_the_stream_begins(scenario):
         def inject(self, fault, *_):
             raise InputError("fault", "component", fault.component, "one of bearing_9")
 
+    at_s = scenario.events[0].at_sample / RATE
     with pytest.raises(
-        InputError, match=r"rig.yaml: event 1 of the timeline: fault: component: got bearing_3"
+        InputError, match=rf"rig.yaml: timeline, at {at_s:g} s: fault: component: got bearing_3"
     ):
         Simulation(scenario, 0, Refuses(RATE))
 

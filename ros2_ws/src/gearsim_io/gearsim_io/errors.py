@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from gearsim_io.same_unit import in_unit_of
+from gearsim_io.suggest import did_you_mean
+
 
 class InputError(ValueError):
     """Bad input, told in one line: where, which field, what was found, what was expected.
@@ -15,7 +18,8 @@ class InputError(ValueError):
     value : object
         What was found, shown shortened.
     expected : str
-        What would have been accepted.
+        What would have been accepted. Of a misspelt name among those listed here (`one of a, b, c`) the
+        message asks whether it was meant.
     """
 
     def __init__(self, where: str, field: str, value: object, expected: str) -> None:
@@ -27,7 +31,17 @@ class InputError(ValueError):
 
     def __str__(self) -> str:
         place = f"{self.where}: {self.field}" if self.field else self.where
-        return f"{place}: got {_short(self.value)}, expected {self.expected}"
+        value = _short(self._value_text())
+        if not isinstance(self.value, str):
+            return f"{place}: got {value}, expected {self.expected}"
+        return f"{place}: got {value}, expected {self.expected}{did_you_mean(self.value, self.expected)}"
+
+    def _value_text(self) -> str:
+        if isinstance(self.value, str):
+            return self.value
+        if isinstance(self.value, (int, float)) and not isinstance(self.value, bool):
+            return in_unit_of(self.expected, self.value, self.field)
+        return repr(self.value)
 
 
 class EnvironmentLackError(RuntimeError):
@@ -39,7 +53,6 @@ class EnvironmentLackError(RuntimeError):
         super().__init__(f"{lack}; mend it with: {remedy}")
 
 
-def _short(value: object, limit: int = 120) -> str:
-    text = value if isinstance(value, str) else repr(value)
+def _short(text: str, limit: int = 120) -> str:
     text = " ".join(text.split())
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -16,6 +16,7 @@ from pydantic import AfterValidator, Field
 
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Bearing, Channel, GearMesh, Machine, PlanetaryStage, Shaft
+from gearsim_io.places import entry
 from gearsim_io.planetary import PlanetaryStageModel, Teeth, make_stage, stage_speeds
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 
@@ -207,8 +208,9 @@ def _check_references(where: str, plate: NameplateModel) -> None:
         named = ((member, getattr(stage, member)) for member in members)
         used += [(f"planetary_stages.{name}.{member}", shaft) for member, shaft in named if shaft]
     used += [(f"bearings.{name}.shaft", bearing.shaft) for name, bearing in plate.bearings.items()]
-    used += [(f"tacho_shafts.{k}", shaft) for k, shaft in enumerate(plate.tacho_shafts)]
-    used += [(f"encoder_shafts.{k}", shaft) for k, shaft in enumerate(plate.encoder_shafts)]
+    for kind, named_shafts in (("tacho", plate.tacho_shafts), ("encoder", plate.encoder_shafts)):
+        count = len(named_shafts)
+        used += [(entry(f"{kind}_shafts", k, count), shaft) for k, shaft in enumerate(named_shafts)]
     for place, shaft in used:
         if shaft not in plate.shafts:
             raise InputError(where, f"nameplate.{place}", shaft, f"one of the shafts {shafts}")
@@ -216,7 +218,7 @@ def _check_references(where: str, plate: NameplateModel) -> None:
         for k, channel in enumerate(bearing.channels):
             if channel not in plate.channels:
                 known = ", ".join(plate.channels) or "(none)"
-                place = f"nameplate.bearings.{name}.channels.{k}"
+                place = entry(f"nameplate.bearings.{name}.channels", k, len(bearing.channels))
                 raise InputError(where, place, channel, f"one of the channels {known}")
 
 

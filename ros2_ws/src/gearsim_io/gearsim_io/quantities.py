@@ -17,11 +17,13 @@ from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, ValidationInfo
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, ErrorDetails, core_schema
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from gearsim_io.errors import InputError
+from gearsim_io.places import place_in
+from gearsim_io.yaml_errors import syntax_error
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 _TEXT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)?\s*$")
@@ -126,7 +128,7 @@ def read_yaml(path: Path) -> Any:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(str(path), "", error, "a readable YAML file") from None
     except YAMLError as error:
-        raise InputError(str(path), "", str(error), "valid YAML") from None
+        raise InputError(str(path), *syntax_error(error)) from None
 
 
 def validate(model: type[ModelT], content: Any, where: str, *, require_source: bool = False) -> ModelT:
@@ -134,16 +136,25 @@ def validate(model: type[ModelT], content: Any, where: str, *, require_source: b
     try:
         return model.model_validate(content, context={"require_source": require_source})
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
+        first = _first(error)
+        loc, message = first["loc"], first["msg"].removeprefix("Value error, ")
         if first["type"] == "extra_forbidden":
-            message = "no such key; " + _known_keys(model, first["loc"])
-        elif first["type"] == "missing":
+            section = place_in(content, loc[:-1])
+            raise InputError(where, section, str(loc[-1]), _known_keys(model, loc)) from None
+        place = place_in(content, loc)
+        if first["type"] == "missing":
             raise InputError(where, place, "nothing", "this key") from None
+        if first["type"] in ("enum", "literal_error"):
+            message = "one of " + first["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
         raise InputError(
             where, place, _as_written(first["input"]), message.removeprefix("Input should be ")
         ) from None
+
+
+def _first(error: ValidationError) -> ErrorDetails:
+    """The first thing wrong; a key that is misspelt comes before the one that is missing for it."""
+    errors = error.errors(include_url=False)
+    return next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
 
 
 def _as_written(value: Any) -> Any:
@@ -164,7 +175,7 @@ def _known_keys(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
         section = _inside(section, part)
     if not _is_model(section):
         return "a key of this section"
-    return "one of " + ", ".join(sorted(f.alias or name for name, f in section.model_fields.items()))
+    return "one of the keys " + ", ".join(sorted(f.alias or name for name, f in section.model_fields.items()))
 
 
 def _inside(section: Any, part: int | str) -> Any:

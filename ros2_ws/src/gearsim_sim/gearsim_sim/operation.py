@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsim_io.errors import InputError
+from gearsim_io.places import entry
 from gearsim_sim.model.assembly import Vector
 from gearsim_sim.model.faults.on_site import hangable_sites, paired, site_directions
 from gearsim_sim.model.plant import LOAD, MOTOR, Plant, Track
@@ -53,11 +54,11 @@ class Operation:
     def _oscillators(self, plant: Plant) -> dict[str, SideOscillator]:
         found = {}
         for number, one in enumerate(self.structure.resonances):
-            where = f"structure.resonances.{number}.site"
+            where = entry("structure.resonances", number, len(self.structure.resonances)) + ".site"
             for axis, direction in enumerate(self._directions(plant, one.site, where)):
                 found[f"resonance_{number + 1}_{axis}"] = one.oscillator((direction,))
         for number, path in enumerate(self.structure.paths):
-            where = f"structure.paths.{number}"
+            where = entry("structure.paths", number, len(self.structure.paths))
             for name, end in (("from", path.from_site), ("to", path.to)):
                 self._directions(plant, end, f"{where}.{name}")
             try:

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, machine_file
 from gearsim_io.nameplate import Channel, Machine
+from gearsim_io.places import entry
 from gearsim_io.quantities import Si, Strict, read_yaml, validate
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.structure import StructureModel
@@ -252,11 +253,14 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
     machine = load_machine(machine_path)
     table = sensor_table(model.sensors, machine, where)
     _check_batch(model.batch_samples, len(table.accelerometers), where)
-    faults = tuple(_fault(fault, f"{where}: faults.{k}") for k, fault in enumerate(model.faults))
+    faults = tuple(
+        _fault(fault, f"{where}: {entry('faults', k, len(model.faults))}")
+        for k, fault in enumerate(model.faults)
+    )
     events = []
     for number, event in enumerate(model.timeline):
         if event.inject is not None:
-            _fault(event.inject, f"{where}: timeline.{number}.inject")
+            _fault(event.inject, f"{where}: {entry('timeline', number, len(model.timeline))}.inject")
         events.append(event.event(model.sample_rate))
     return Scenario(
         name=path.stem,

@@ -53,11 +53,12 @@ class Simulation:
         self._factor = scenario.sensors.sampling.oversampling
         self._model = model or _told(scenario, lambda: _model(scenario))
         self._history = History(scenario, None if self._model.steady else self._model.operating_point_at)
-        for number, event in enumerate(scenario.events):
+        for event in scenario.events:
             try:
                 self._schedule(event)
             except InputError as error:
-                where = f"{scenario.source}: event {number + 1} of the timeline: {error.where}"
+                at_s = (event.at_sample or 0) / scenario.sample_rate_hz
+                where = f"{scenario.source}: timeline, at {at_s:g} s: {error.where}"
                 raise InputError(where, error.field, error.value, error.expected) from None
         self._requested = 0
         self._sent = 0
