@@ -1,0 +1,1 @@
+"""How impulsive a signal is, and in which band: moments, spectral kurtosis, protrugram, autogram."""
