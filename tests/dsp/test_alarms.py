@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds, format_alarm
+from gearsim_dsp.alarm_book import AlarmBook
+from gearsim_dsp.alarms import AlarmSettings, Indication, Judgement, Latch, Thresholds, format_alarm
 from gearsim_dsp.results import Level
 from gearsim_io.errors import InputError
 
@@ -230,3 +231,116 @@ def test_a_line_for_people():
 def test_impossible_settings_are_refused(bad):
     with pytest.raises(InputError, match="alarm settings"):
         AlarmSettings(**bad)
+
+
+# Latching, acknowledging, resetting
+
+
+def flags(alarm):
+    return alarm.level.name, alarm.present, alarm.acknowledged
+
+
+def test_a_latched_alarm_stays_until_somebody_took_note():
+    alarms = book(latch=Latch.ALL)
+    flat = [a for step in feed(alarms, [30] * 3 + [0] * 12) for a in step]
+    assert [flags(a) for a in flat] == [("ERROR", True, False), ("ERROR", False, False)]
+    assert "not seen in the last 8 windows; ERROR is kept until it is acknowledged" in flat[-1].reason
+    assert alarms.state().level == Level.ERROR
+    # its cause comes back and goes again: both are told, the level stays
+    again = [a for step in feed(alarms, [30] * 3 + [0] * 12, start=15) for a in step]
+    assert [flags(a) for a in again] == [("ERROR", True, False), ("ERROR", False, False)]
+    (over,) = alarms.acknowledge("envelope/bearing_3/outer_race", "Ada")
+    assert flags(over) == ("OK", False, False)
+    assert over.reason == "outer race of bearing_3: acknowledged by Ada, its cause has gone"
+    assert alarms.state().active == ()
+    assert over.t_ns == 29 * HOP_NS
+
+
+def test_an_acknowledged_alarm_ends_with_its_cause_and_a_higher_level_wants_another():
+    alarms = book(latch=Latch.ALL)
+    feed(alarms, [9] * 3)
+    (noted,) = alarms.acknowledge(operator="Ada")
+    assert flags(noted) == ("WARN", True, True)
+    assert noted.acknowledged_by == "Ada"
+    assert noted.reason.endswith("21 dB over the floor (acknowledged by Ada)")
+    assert alarms.acknowledge() == []  # nothing new
+    assert alarms.state().active[0].acknowledged
+    flat = [a for step in feed(alarms, [30] * 3, start=3) for a in step]
+    assert [flags(a) for a in flat] == [("ERROR", True, False)]
+    alarms.acknowledge()
+    flat = [a for step in feed(alarms, [0] * 12, start=6) for a in step]
+    assert [flags(a) for a in flat] == [("OK", False, False)]
+
+
+def test_only_errors_latch_where_that_is_asked_for():
+    alarms = book(latch=Latch.ERROR)
+    flat = [a for step in feed(alarms, [9] * 3 + [0] * 12) for a in step]
+    assert [a.level.name for a in flat] == ["WARN", "OK"]
+    flat = [a for step in feed(alarms, [30] * 3 + [5] * 9, start=15) for a in step]
+    assert [flags(a) for a in flat] == [("ERROR", True, False)]  # WARN is all that shows, ERROR is kept
+    (noted,) = alarms.acknowledge()
+    assert flags(noted) == ("WARN", True, True)
+    assert noted.reason.endswith("it has come down to WARN meanwhile")
+
+
+def test_a_reset_takes_an_alarm_back_and_a_fault_that_is_there_comes_again():
+    alarms = book(latch=Latch.ALL)
+    row = (sign(30), sign(30, fault="inner_race"))
+    feed(alarms, [row] * 4)
+    (back,) = alarms.clear("envelope/bearing_3/inner_race", "Ada")
+    assert flags(back) == ("OK", False, False)
+    assert back.reason == "inner race of bearing_3: reset by Ada"
+    assert [a.fault for a in alarms.state().active] == ["outer_race"]
+    assert [flags(a) for a in alarms.clear()] == [("OK", False, False)]
+    again = feed(alarms, [row] * 3, start=4)
+    assert [len(step) for step in again] == [0, 2, 0]  # as any new alarm: with the second window
+
+
+@pytest.mark.parametrize("act", ["acknowledge", "clear"])
+def test_an_alarm_that_is_not_there_is_told_with_those_that_are(act):
+    alarms = book()
+    assert getattr(alarms, act)() == []
+    with pytest.raises(InputError, match="nothing: no alarm is active"):
+        getattr(alarms, act)("envelope/x/y")
+    feed(alarms, [30] * 3)
+    with pytest.raises(InputError, match="one of envelope/bearing_3/outer_race"):
+        getattr(alarms, act)("envelope/x/y")
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(
+        st.one_of(st.sampled_from([0.0, 5.0, 9.0, 20.0]), st.sampled_from(["ack", "reset"])), max_size=60
+    )
+)
+def test_latched_alarms_never_fall_by_themselves(steps):
+    alarms, level, acknowledged = book(latch=Latch.ALL), Level.OK, False
+    for k, step in enumerate(steps):
+        if step == "ack":
+            changes = alarms.acknowledge()
+        elif step == "reset":
+            changes = alarms.clear()
+        else:
+            changes = feed(alarms, [step], start=k)[0]
+        for alarm in changes:
+            assert alarm.previous_level == level
+            if alarm.level < level:
+                assert step in ("ack", "reset") or acknowledged
+            assert alarm.present or not acknowledged or alarm.level == Level.OK
+            level, acknowledged = alarm.level, alarm.acknowledged
+        assert alarms.state().level == level
+
+
+@pytest.mark.parametrize("latch", list(Latch))
+def test_no_chatter_when_latched_either(latch):
+    values = LIMITS.warn + 1.5 * np.random.default_rng(5).standard_normal(5000)
+    alarms = book(latch=latch)
+    assert len([a for step in feed(alarms, values.tolist()) for a in step]) <= 1
+    alarms.acknowledge()
+    assert not any(feed(alarms, values.tolist(), start=5000))
+
+
+def test_a_place_makes_alarms_of_one_fault_distinct():
+    row = tuple(replace(sign(20, group=c, channel=c), place=c) for c in ("b1_y", "b3_y"))
+    flat = [a for step in feed(book(), [row] * 2) for a in step]
+    assert [a.alarm_id for a in flat] == [f"envelope/bearing_3/outer_race/{c}" for c in ("b1_y", "b3_y")]

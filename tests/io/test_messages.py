@@ -114,10 +114,31 @@ ALARM = results.Alarm(
     confidence=0.99,
     sample=131071,
     reason="because",
+    present=False,
+    acknowledged=True,
+    acknowledged_by="Ada",
 )
 MARKER = results.SpectrumMarker("BPFO", "bearing_3", 4.89, 5, 0.0, 30.0)
+TREND = results.TrendValue(
+    source="kurtosis",
+    channel="b3_y",
+    component="",
+    name="rms",
+    unit="m/s^2",
+    value=2.0,
+    expected=1.5,
+    limit=3.0,
+    deviation=4.0,
+    slope=0.25,
+    slope_low=0.125,
+    slope_high=0.5,
+    direction="rising",
+    hours_to_limit=4.0,
+    span_s=3600.0,
+)
 OBJECTS = [
     ALARM,
+    results.Trends(9, "rig", "trend", 131071, "learnt from 60 s", (TREND, TREND)),
     results.AlarmState(6, "rig", "envelope", Level.ERROR, False, "", 131071, (ALARM, ALARM)),
     results.Features(
         t0_ns=7,

@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 
 from gearsim_io.health import Level
 
-__all__ = ["Alarm", "AlarmState", "FeatureValue", "Features", "Level", "Spectrum", "SpectrumMarker"]
+__all__ = [
+    "Alarm",
+    "AlarmState",
+    "FeatureValue",
+    "Features",
+    "Level",
+    "Spectrum",
+    "SpectrumMarker",
+    "TrendValue",
+    "Trends",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +92,10 @@ class Spectrum:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One change of one alarm's level; `t_ns` and `sample` are of the last sample that led to it."""
+    """One change of one alarm; `t_ns` and `sample` are of the last sample that led to it.
+
+    `present` is false where the level is only kept (latched), or OK; `acknowledged` belongs to the level.
+    """
 
     t_ns: int
     frame_id: str
@@ -102,6 +115,9 @@ class Alarm:
     confidence: float
     sample: int
     reason: str
+    present: bool = True
+    acknowledged: bool = False
+    acknowledged_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,3 +132,36 @@ class AlarmState:
     note: str
     sample: int
     active: tuple[Alarm, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TrendValue:
+    """Where one indicator stands and where it goes; see `gearsim_msgs/TrendValue` for the meaning of NaN."""
+
+    source: str
+    channel: str
+    component: str
+    name: str
+    unit: str
+    value: float
+    expected: float
+    limit: float
+    deviation: float
+    slope: float
+    slope_low: float
+    slope_high: float
+    direction: str
+    hours_to_limit: float
+    span_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trends:
+    """All indicators that a node follows, as of the last sample that counts (`t_ns`, `sample`)."""
+
+    t_ns: int
+    frame_id: str
+    source: str
+    sample: int
+    baseline: str
+    values: tuple[TrendValue, ...] = ()

@@ -80,6 +80,7 @@ ALARM = Topic("alarm", "gearsim_msgs/msg/Alarm", RESULT)
 # One per judging node, `ALARM_STATE.of("envelope")`: two latched publishers of one topic hide each other.
 ALARM_STATE = Topic("alarm_state", "gearsim_msgs/msg/AlarmState", LATCHED)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", Qos(depth=10))
+TRENDS = Topic("trends", "gearsim_msgs/msg/Trends", RESULT)
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", Qos(depth=1, reliable=False))
 
 TOPICS = (
@@ -94,6 +95,9 @@ TOPICS = (
     ALARM,
     ALARM_STATE.of("envelope"),
     ALARM_STATE.of("kurtosis"),
+    ALARM_STATE.of("gear"),
+    ALARM_STATE.of("trend"),
+    TRENDS,
     DIAGNOSTICS,
 )
 """What a recorder takes by default: all but /clock."""

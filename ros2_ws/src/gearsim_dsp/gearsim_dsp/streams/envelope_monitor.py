@@ -99,6 +99,11 @@ class EnvelopeMonitor:
         self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
         self._run = 0
 
+    @property
+    def hop_s(self) -> float:
+        """Distance of two windows, in seconds of signal."""
+        return self.settings.window.hop_s
+
     def push(self, batch: Batch) -> list[Report]:
         """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
         return [self._report(window) for window in self.assembler.push(batch)]

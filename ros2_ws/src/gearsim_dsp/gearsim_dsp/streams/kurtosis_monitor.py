@@ -87,6 +87,11 @@ class KurtosisMonitor:
         self.assembler = WindowAssembler(machine, self.settings.window)
         self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
 
+    @property
+    def hop_s(self) -> float:
+        """Distance of two windows, in seconds of signal."""
+        return self.settings.window.hop_s
+
     def push(self, batch: Batch) -> list[Report]:
         """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
         return [self._report(window) for window in self.assembler.push(batch)]

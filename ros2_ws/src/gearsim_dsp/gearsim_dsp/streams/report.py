@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from gearsim_dsp.alarms import AlarmBook, AlarmSettings, Indication, Judgement, Thresholds
+from gearsim_dsp.alarm_book import AlarmBook
+from gearsim_dsp.alarms import AlarmSettings, Indication, Judgement, Thresholds
 from gearsim_dsp.quality import QualityIssue
-from gearsim_dsp.results import Alarm, AlarmState, Features, Level, Spectrum
-from gearsim_dsp.streams.assembler import Batch, WindowAssembler
+from gearsim_dsp.results import Alarm, AlarmState, Features, Level, Spectrum, Trends
+from gearsim_dsp.streams.assembler import WindowAssembler
 from gearsim_io.nameplate import Machine
 
 __all__ = ["AlarmedMonitor", "Monitor", "Outcome", "Report"]
@@ -38,6 +39,12 @@ class Report:
     quality : tuple of QualityIssue
     results : tuple
         The analysis itself (`window.WindowResult` of each channel), for those who combine windows.
+    scope : str
+        What the groups that this report speaks of begin with; empty: it speaks of all.
+    passed : bool
+        True when nothing was to be judged here, so that alarms and their state stay as they are.
+    trends : Trends or None
+        Trends to be published.
     """
 
     run: int
@@ -53,16 +60,28 @@ class Report:
     note: str
     quality: tuple[QualityIssue, ...]
     results: tuple[Any, ...] = ()
+    scope: str = ""
+    passed: bool = False
+    trends: Trends | None = None
 
 
 class Monitor(Protocol):
-    """A streaming analysis: batches in, reports out, no clock."""
+    """A streaming analysis: batches (or indicators) in, reports out, no clock."""
 
     source: str
     machine: Machine
-    assembler: WindowAssembler
 
-    def push(self, batch: Batch) -> list[Report]:
+    @property
+    def assembler(self) -> WindowAssembler | None:
+        """Where windows are made of samples, None where none are."""
+        ...
+
+    @property
+    def hop_s(self) -> float:
+        """Distance of two windows, in seconds of signal."""
+        ...
+
+    def push(self, batch: Any) -> list[Report]:
         """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
         ...
 
@@ -103,11 +122,11 @@ class AlarmedMonitor:
         self._note = ""
 
     @property
-    def assembler(self) -> WindowAssembler:
+    def assembler(self) -> WindowAssembler | None:
         """Where the monitor's windows are made, with the counts of gaps and the like."""
         return self.monitor.assembler
 
-    def push(self, batch: Batch) -> list[Outcome]:
+    def push(self, batch: Any) -> list[Outcome]:
         """Take one batch; return what became of the windows that are complete now."""
         return [self._outcome(report) for report in self.monitor.push(batch)]
 
@@ -123,6 +142,16 @@ class AlarmedMonitor:
             return AlarmState(0, frame_id, self.monitor.source, Level.OK, True, "no window judged yet", 0)
         return self._book.state(self._note, bool(self._note))
 
+    def acknowledge(self, alarm_id: str = "", by: str = "") -> list[Alarm]:
+        """Take note of an alarm, or of all; see `AlarmBook.acknowledge`."""
+        book = self._book or self._empty_book()
+        return book.acknowledge(alarm_id, by)
+
+    def clear(self, alarm_id: str = "", by: str = "") -> list[Alarm]:
+        """Take an alarm back, or all, and forget what led to it; see `AlarmBook.clear`."""
+        book = self._book or self._empty_book()
+        return book.clear(alarm_id, by)
+
     def withdraw(self, why: str) -> list[Alarm]:
         """Take all alarms back, as of the last window judged."""
         if self._book is None:
@@ -131,6 +160,8 @@ class AlarmedMonitor:
         return self._book.reset(last.t_ns, last.sample, why)
 
     def _outcome(self, report: Report) -> Outcome:
+        if report.passed:
+            return Outcome(report, (), self.present, False)
         changes: list[Alarm] = []
         book = self._book
         if book is None or report.tests != self._tests or report.frame_id != book.frame_id:
@@ -143,7 +174,9 @@ class AlarmedMonitor:
         news = note != self._note
         self._note = note
         if report.judged:
-            changes += book.judge(Judgement(report.last_ns, report.end_sample - 1, report.indications))
+            changes += book.judge(
+                Judgement(report.last_ns, report.end_sample - 1, report.indications, report.scope)
+            )
         due = book.state_due()
         return Outcome(report, tuple(changes), self.present, due or bool(changes) or news)
 
@@ -152,6 +185,8 @@ class AlarmedMonitor:
 
     def _new_book(self, report: Report) -> AlarmBook:
         self._tests = report.tests
-        hop_s = self.assembler.settings.hop_s
-        thresholds = Thresholds.derive(self.settings, max(report.tests, 1), hop_s)
-        return AlarmBook(self.monitor.source, report.frame_id, self.settings, thresholds)
+        return self._empty_book(report.frame_id)
+
+    def _empty_book(self, frame_id: str = "") -> AlarmBook:
+        thresholds = Thresholds.derive(self.settings, max(self._tests, 1), self.monitor.hop_s)
+        return AlarmBook(self.monitor.source, frame_id, self.settings, thresholds)
