@@ -96,7 +96,7 @@ def test_an_existing_folder_is_refused_and_left_alone(tmp_path, capsys):
     taken.mkdir()
     (taken / "mine.txt").write_text("mine")
     assert cli.main(["simulate", "quick", "--seconds", "1", "--out", str(taken)]) == 2
-    assert "it exists already" in capsys.readouterr().err
+    assert "got a folder that exists already, expected the name of a new folder" in capsys.readouterr().err
     assert [file.name for file in taken.iterdir()] == ["mine.txt"]
 
 

@@ -104,6 +104,8 @@ def test_full_scale_is_not_known_without_a_range(tmp_path):
     assert math.isnan(scenario.machine.channels[0].full_scale)
 
 
+_TRACE = "time_s,speed_hz,load_nm\n" + "".join(f"{k},{5 + k},{7 + k}\n" for k in range(8))
+
 BAD = [
     ("speed: 10 Hz", "got speed, expected one of the keys batch_samples, description, faults, "),
     ("model: lpm99", "model: got lpm99, expected one of bearing2, "),
@@ -171,8 +173,15 @@ def test_bad_scenarios_are_told_in_one_line(tmp_path, text, message):
     ("base", "message"),
     [
         ("", "expected a mapping of scenario keys"),
-        ("machine: unsw_parallel", "operating_point: got nothing, expected this key"),
-        ("operating_point: {speed: 10 Hz}", "operating_point.load: got nothing, expected this key"),
+        ("machine: unsw_parallel", "operating_point.speed: got nothing, expected a speed, or else"),
+        (
+            "operating_point: {speed: 10 Hz}",
+            "operating_point.load: got nothing, expected a load, or else a load column in profile.trace",
+        ),
+        (
+            "profile: {trace: {file: trace.csv}}",
+            "operating_point.load: got nothing, expected a load, or else a load column in profile.trace",
+        ),
         (
             "machine: moon\n" + BASE.replace("machine: unsw_parallel", ""),
             "machine: got moon, expected one of",
@@ -180,9 +189,18 @@ def test_bad_scenarios_are_told_in_one_line(tmp_path, text, message):
     ],
 )
 def test_bad_wholes(tmp_path, base, message):
+    (tmp_path / "trace.csv").write_text(_TRACE)
     with pytest.raises(InputError) as caught:
         _load(tmp_path, "", base)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(("point", "load_nm"), [("{}", 7.0), ("{load: 20 N*m}", 20.0)])
+def test_a_trace_may_give_the_load(tmp_path, point, load_nm):
+    (tmp_path / "trace.csv").write_text(_TRACE)
+    base = f"operating_point: {point}\nprofile: {{trace: {{file: trace.csv, load: load_nm}}}}"
+    scenario = _load(tmp_path, "", base)
+    assert (scenario.speed_hz, scenario.load_nm) == (5.0, load_nm)
 
 
 def test_unknown_names_and_files(tmp_path):

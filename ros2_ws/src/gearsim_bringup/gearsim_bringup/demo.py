@@ -12,8 +12,9 @@ from gearsim_bringup.ui import Voice
 from gearsim_io import cdr, qos
 from gearsim_io.bags import read_bag
 from gearsim_io.datasets import data_folders, find_record
-from gearsim_io.errors import EnvironmentLackError, InputError
+from gearsim_io.errors import EnvironmentLackError
 from gearsim_io.importers import import_to_bag
+from gearsim_io.new_paths import refuse_existing
 from gearsim_sim.scenario import Scenario, load_scenario
 
 REAL_RECORD, REAL_MACHINE = "mfpt/OuterRaceFault_1.mat", "mfpt"
@@ -32,8 +33,7 @@ class Demo:
     """Runs the demonstration into the new folder `out`."""
 
     def __init__(self, voice: Voice, out: Path) -> None:
-        if out.exists():
-            raise InputError(str(out), "", "it exists already", "the name of a new folder")
+        refuse_existing(out, "the name of a new folder")
         self._voice = voice
         self._out = out
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
+from gearsim_io.new_paths import refuse_existing
 from gearsim_sim.ensemble import Ensemble
 from gearsim_sim.ensemble_spec import EnsembleSpec, NamedVariant, table
 
@@ -39,8 +40,7 @@ def run_to(
     total = round(seconds * spec.base.sample_rate_hz)
     if total < 1:
         raise InputError("ensemble", "seconds", seconds, f"at least {1 / spec.base.sample_rate_hz:g}")
-    if out.exists():
-        raise InputError(str(out), "", "it exists already", "the name of a new folder")
+    refuse_existing(out, "the name of a new folder")
     ensemble = spec.ensemble(workers)
     out.mkdir(parents=True)
     try:

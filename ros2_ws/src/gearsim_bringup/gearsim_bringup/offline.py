@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from gearsim_io.bags import BagWriter, StreamWriter
 from gearsim_io.batches import EncoderBatch, SampleBatch, TachoBatch, TorqueBatch
 from gearsim_io.errors import InputError
+from gearsim_io.new_paths import refuse_existing
 from gearsim_sim.scenario import Scenario
 from gearsim_sim.simulation import Simulation
 
-FORMATS = ("mcap", "npz", "wav")
 Batch = SampleBatch | TachoBatch | EncoderBatch | TorqueBatch
 
 
@@ -60,8 +60,7 @@ def simulate_to(
     total = round(seconds * scenario.sample_rate_hz)
     if total < 1:
         raise InputError("simulate", "seconds", seconds, f"at least {1 / scenario.sample_rate_hz:g}")
-    if out.exists():
-        raise InputError(str(out), "", "it exists already", "the name of a new folder")
+    refuse_existing(out, "the name of a new folder")
     simulation = Simulation(scenario)
     try:
         files = _run(simulation, total, out, formats, progress)

@@ -23,6 +23,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+FORMATS = ("mcap", "npz", "wav")  # that a run can be written in
 POSITIVE = FiniteRange(min=0, min_open=True)
 ANY_PATH = click.Path(path_type=Path)  # existence is checked where the error can say what was expected
 

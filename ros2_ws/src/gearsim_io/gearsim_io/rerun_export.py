@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from gearsim_io.bags import BagError, BagMessage, decode, read_bag
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_io.messages import stamp_ns
+from gearsim_io.new_paths import refuse_existing
 
 if TYPE_CHECKING:
     from gearsim_io.scene import Overview
@@ -188,8 +189,8 @@ def _target(out: Path | str, suffix: str, overwrite: bool) -> Path:
     path = Path(out)
     if path.suffix != suffix:
         raise InputError(str(path), "", path.suffix or "no suffix", f"a name that ends in {suffix}")
-    if path.exists() and not overwrite:
-        raise InputError(str(path), "", "a file that exists already", "the name of a new file")
+    if not overwrite:
+        refuse_existing(path, "the name of a new file")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,7 @@
-"""The models that a scenario can name: each turns a scenario into something that runs."""
+"""The models that a scenario can name: each turns a scenario into something that runs.
+
+What a model needs is imported when it is made: a scenario must be read, and refused, without the wait.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from gearsim_sim.engine import Engine, EngineOutput
 from gearsim_sim.events import Event, FaultSpec
-from gearsim_sim.params import load_bearing_rig_params, load_parallel_params, load_planetary_params
 
 if TYPE_CHECKING:
+    from gearsim_sim.engine import EngineOutput
     from gearsim_sim.scenario import Scenario
 
 
@@ -64,15 +66,21 @@ class RunningModel(Protocol):
 
 
 def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> Any:
+    from gearsim_sim.params.parallel import load_parallel_params
+
     params = load_parallel_params(scenario.machine_path, scenario.parameters, scenario.source)
     return params.model_copy(update={"pedestals": pedestals})
 
 
 def _planetary(scenario: Scenario) -> Any:
+    from gearsim_sim.params.planetary import load_planetary_params
+
     return load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
 
 
 def _bearing_rig(scenario: Scenario, *, dofs: Literal[2, 4, 5]) -> Any:
+    from gearsim_sim.params.bearing_rig import load_bearing_rig_params
+
     params = load_bearing_rig_params(scenario.machine_path, scenario.parameters, scenario.source)
     return params.with_dofs(dofs)
 
@@ -93,6 +101,8 @@ def parameters(scenario: Scenario) -> Any:
 
 
 def _engine(scenario: Scenario) -> RunningModel:
+    from gearsim_sim.engine import Engine
+
     return Engine(
         parameters(scenario),
         scenario.seed,

@@ -110,6 +110,23 @@ class Operation:
             return given
         return float(read_trace(trace, self.folder)[0].values[0])
 
+    def first_load_nm(self, given: float | None) -> float:
+        """The load at the start: as given, or that of the measured trace.
+
+        Raises
+        ------
+        InputError
+            If there is neither, or the trace cannot be read.
+        """
+        if given is not None:
+            return given
+        trace = self.profile.trace
+        load = None if trace is None else read_trace(trace, self.folder)[1]
+        if load is None:
+            expected = "a load, or else a load column in profile.trace"
+            raise InputError(self.where, "operating_point.load", "nothing", expected)
+        return float(load.values[0])
+
     def forces(self, plant: Plant) -> tuple[RotatingForce, ...]:
         """Ripple of the torques, on the machine that `machine` has given."""
         ripple = self.profile.ripple

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -23,12 +23,13 @@ from gearsim_io.quantities import Si, Strict, read_yaml, validate
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.model.structure import StructureModel
 from gearsim_sim.models import MODELS
-from gearsim_sim.operation import Operation
 from gearsim_sim.profile.settings import ProfileModel
 from gearsim_sim.sensors.rows import SensorTable
 from gearsim_sim.sensors.settings import SensorsModel
 from gearsim_sim.sensors.table import sensor_table
-from gearsim_sim.truth import fault_parameters
+
+if TYPE_CHECKING:
+    from gearsim_sim.operation import Operation
 
 FOLDER = Path(__file__).parent / "scenarios"
 # Fast DDS passes messages through shared memory only up to its segment size; larger ones are lost under load.
@@ -42,13 +43,14 @@ Load = Annotated[float, Si("N*m", ge=0, le=1e5)]
 class OperatingPointModel(Strict):
     """Speed of the reference shaft and load torque at the start.
 
-    Under a law of torques it is what is to be reached; beside a measured trace there is no speed here.
+    Under a law of torques it is what is to be reached; beside a measured trace there is no speed here, and
+    no load where the trace has one.
     """
 
     speed: Speed | None = None
     """Speed of the reference shaft at the start; under a law of torques that to be reached."""
-    load: Load
-    """Load torque at the start."""
+    load: Load | None = None
+    """Load torque at the start; may be left out where a measured trace gives the load."""
 
 
 class FaultModel(Strict):
@@ -142,7 +144,7 @@ class ScenarioModel(Strict):
     """Samples per message."""
     rate_factor: Annotated[float, Si("", ge=0, le=1000)] = 1.0
     """Pace of the live rig in times of real time; 0 is as fast as it goes."""
-    operating_point: OperatingPointModel
+    operating_point: OperatingPointModel = OperatingPointModel()
     profile: ProfileModel = ProfileModel()
     structure: StructureModel = StructureModel()
     sensors: SensorsModel = SensorsModel()
@@ -248,7 +250,6 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
     model = validate(ScenarioModel, content, where)
     if model.model not in MODELS:
         raise InputError(where, "model", model.model, "one of " + ", ".join(sorted(MODELS)))
-    operation = Operation(model.profile, model.structure, where, path.parent)
     machine_path = _machine_path(model.machine, path)
     machine = load_machine(machine_path)
     table = sensor_table(model.sensors, machine, where)
@@ -262,6 +263,7 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
         if event.inject is not None:
             _fault(event.inject, f"{where}: {entry('timeline', number, len(model.timeline))}.inject")
         events.append(event.event(model.sample_rate))
+    operation = _operation(model, path)
     return Scenario(
         name=path.stem,
         description=model.description,
@@ -275,7 +277,7 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
         batch_samples=model.batch_samples,
         rate_factor=model.rate_factor,
         speed_hz=operation.first_speed_hz(model.operating_point.speed),
-        load_nm=model.operating_point.load,
+        load_nm=operation.first_load_nm(model.operating_point.load),
         operation=operation,
         sensors=table,
         parameters=model.parameters,
@@ -284,7 +286,15 @@ def parse_scenario(content: Any, path: Path) -> Scenario:
     ).with_events(events)
 
 
+def _operation(model: ScenarioModel, path: Path) -> Operation:
+    from gearsim_sim.operation import Operation  # here and last, because it takes long to load
+
+    return Operation(model.profile, model.structure, str(path), path.parent)
+
+
 def _fault(fault: FaultModel, where: str) -> FaultSpec:
+    from gearsim_sim.truth import fault_parameters  # here, because all kinds of faults take long to load
+
     spec = fault.spec()
     try:
         fault_parameters(spec)

@@ -36,11 +36,12 @@ def command(
 ) -> None:
     """Diagnose a bag or a measured file with the code of the diagnostic nodes."""
     from gearsim_bringup.sources import open_source
-    from gearsim_dsp.diagnose import diagnose_record
     from gearsim_io.importers import Overrides
 
     voice = Voice(json_mode=json_mode)
     record, nameplate = open_source(source, machine, Overrides(rate, unit, columns, (), speed))
+    from gearsim_dsp.diagnose import diagnose_record  # after what can be refused at once
+
     diagnosis = diagnose_record(record, nameplate)
     voice.result(diagnosis.to_json())
     for line in diagnosis.lines():

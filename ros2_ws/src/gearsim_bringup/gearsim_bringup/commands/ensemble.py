@@ -29,10 +29,15 @@ def command(spec: Path, seconds: float, out: Path, workers: int | None, json_mod
 
     Written are clean accelerations at the machine's sites; sensors belong to simulate and run.
     """
-    from gearsim_bringup.ensemble_files import run_to
-    from gearsim_sim.ensemble_spec import load_ensemble_spec
+    from gearsim_io.new_paths import refuse_existing
+    from gearsim_io.quantities import read_yaml
 
     voice = Voice(json_mode=json_mode)
+    refuse_existing(out, "the name of a new folder")
+    read_yaml(spec)
+    from gearsim_bringup.ensemble_files import run_to  # after what can be refused at once
+    from gearsim_sim.ensemble_spec import load_ensemble_spec
+
     loaded = load_ensemble_spec(spec)
     threads = workers or os.cpu_count() or 1
     tell_first_use(voice)

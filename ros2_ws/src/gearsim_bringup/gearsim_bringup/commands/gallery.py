@@ -23,7 +23,11 @@ EXAMPLE = """
 @json_option
 def command(out: Path, only: tuple[str, ...], seconds: float, json_mode: bool) -> None:
     """Draw waveform, spectrum and envelope spectrum of every kind of fault."""
-    from gearsim_bringup.gallery.page import make_gallery
+    from gearsim_sim.model.faults import fault_kind
+
+    for kind in only:
+        fault_kind(kind)
+    from gearsim_bringup.gallery.page import make_gallery  # after what can be refused at once
 
     voice = Voice(json_mode=json_mode)
     tell_first_use(voice)

@@ -34,15 +34,16 @@ def command(
     Topics are under /gearsim, in the ROS domain of the environment; watch with `ros2 topic echo
     /gearsim/alarm`. Ctrl-C ends it.
     """
-    from gearsim_bringup.live import MONITORS, LiveRun, simulator
     from gearsim_bringup.tell import Teller
-    from gearsim_io.errors import InputError
+    from gearsim_io.new_paths import refuse_existing
     from gearsim_sim.scenario import load_scenario
 
+    for path, what in ((bag, "bag"), (rrd, "file")):
+        if path is not None:
+            refuse_existing(path, f"the name of a new {what}")
     loaded = load_scenario(scenario)
-    for path in (bag, rrd):
-        if path is not None and path.exists():
-            raise InputError(str(path), "", "it exists already", "a new name")
+    from gearsim_bringup.live import MONITORS, LiveRun, simulator  # after what can be refused at once
+
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)
     listeners = len(MONITORS) + (bag is not None) + (rrd is not None)

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from gearsim_bringup.first_use import tell_first_use
-from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
+from gearsim_bringup.options import ANY_PATH, FORMATS, POSITIVE, example, json_option
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
@@ -19,8 +19,6 @@ EXAMPLE = """
 
 
 def _formats(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
-    from gearsim_bringup.offline import FORMATS
-
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     unknown = [name for name in names if name not in FORMATS]
     if unknown:
@@ -39,11 +37,14 @@ def command(
     scenario: str, seconds: float, out: Path, formats: tuple[str, ...], seed: int | None, json_mode: bool
 ) -> None:
     """Run a SCENARIO (a shipped name, or a YAML file) offline: bit for bit what the live rig sends."""
-    from gearsim_bringup.offline import simulate_to
+    from gearsim_io.new_paths import refuse_existing
     from gearsim_sim.scenario import load_scenario
 
     voice = Voice(json_mode=json_mode)
+    refuse_existing(out, "the name of a new folder")
     loaded = load_scenario(scenario)
+    from gearsim_bringup.offline import simulate_to  # after what can be refused at once
+
     if seed is not None:
         loaded = dataclasses.replace(loaded, seed=seed)
     tell_first_use(voice)

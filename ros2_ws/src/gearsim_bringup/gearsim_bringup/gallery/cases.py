@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gearsim_io.errors import InputError
 from gearsim_sim.events import FaultSpec, Inject
-from gearsim_sim.model.faults import REGISTRY
+from gearsim_sim.model.faults import REGISTRY, fault_kind
 from gearsim_sim.scenario import Scenario, load_scenario, scenario_names
 from gearsim_sim.sensors.rows import Row, SensorTable, Tacho
 
@@ -37,8 +37,7 @@ def cases(only: tuple[str, ...] = ()) -> list[Case]:
         An unknown kind, or a kind that no shipped scenario shows.
     """
     for kind in only:
-        if kind not in REGISTRY:
-            raise InputError("gallery", "only", kind, "some of " + ", ".join(REGISTRY))
+        fault_kind(kind)
     scenarios = [load_scenario(name) for name in scenario_names()]
     return [_case(kind, scenarios) for kind in only or REGISTRY]
 

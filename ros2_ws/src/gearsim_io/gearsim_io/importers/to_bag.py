@@ -13,6 +13,7 @@ from gearsim_io.importers.build import import_file, machine_for
 from gearsim_io.importers.content import stem_of
 from gearsim_io.importers.settings import Overrides
 from gearsim_io.machines import load_machine
+from gearsim_io.new_paths import refuse_existing
 from gearsim_io.record import Record
 
 _BATCH_SAMPLES = 4096
@@ -63,12 +64,9 @@ def import_to_bag(
     records = [import_file(path, machine, overrides) for path in paths]
     places = [target] if len(paths) == 1 else [target / stem_of(path) for path in paths]
     for path, place in zip(paths, places, strict=True):
-        if place.exists() or places.count(place) > 1:
-            got = (
-                "a folder that exists already"
-                if place.exists()
-                else f"wanted by several files, {path.name} among them"
-            )
+        refuse_existing(place, "the name of a new bag")
+        if places.count(place) > 1:
+            got = f"wanted by several files, {path.name} among them"
             raise InputError(str(place), "", got, "the name of a new bag")
     for path, place, record in zip(paths, places, records, strict=True):
         custom = {

@@ -14,7 +14,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.signal import firwin2
 
 from gearsim_sim.profile.curve import Stretch
 
@@ -90,6 +89,8 @@ def _basis() -> Array:
 
 def _filter(low: float, high: float) -> Array:
     """Taps of the band-pass; edges in fractions of the knots' rate (`high` at most 1/8)."""
+    from scipy.signal import firwin2  # here, because it takes long to load
+
     width = min(0.25 * high, 0.5 * low if low > 0 else 1.0)
     count = 2 * int(np.ceil(2.0 / width)) + 1
     grid = np.linspace(0.0, 0.5, 4 * count)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -31,22 +30,6 @@ class Sections:
 
     def apply(self, block: Array) -> None:
         """Filter `block` (rows, samples), which continues the block before."""
+        from gearsim_sim.sensors.loops import filter_rows
+
         filter_rows(block, self._rows, self._coefficients, self.state)
-
-
-@njit(cache=True, nogil=True)
-def filter_rows(block, rows, coefficients, state):  # type: ignore[no-untyped-def]
-    """Transposed direct form II; `state` (sections, 2) is read and kept."""
-    for i in range(rows.size):
-        row = block[rows[i]]
-        b0, b1, b2, a1, a2 = coefficients[i]
-        s0 = state[i, 0]
-        s1 = state[i, 1]
-        for k in range(row.size):
-            x = row[k]
-            y = b0 * x + s0
-            s0 = b1 * x - a1 * y + s1
-            s1 = b2 * x - a2 * y
-            row[k] = y
-        state[i, 0] = s0
-        state[i, 1] = s1

@@ -12,7 +12,6 @@ import hashlib
 import numpy as np
 from numpy.random import Philox
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 Array = NDArray[np.float64]
 _SHIFT = np.uint64(11)
@@ -35,6 +34,8 @@ def uniform(source: Philox, count: int) -> Array:
 
 def normal(source: Philox, count: int) -> Array:
     """The next `count` standard normal deviates, one number of the sequence each (within +-8.3)."""
+    from scipy.special import ndtri  # here, because it takes long to load
+
     deviates = uniform(source, count)
     ndtri(deviates, out=deviates)
     return deviates

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 
@@ -57,12 +56,14 @@ class EdgeFinder:
         offsets : ndarray of float64
             Where, as fractional samples from the first sample, ascending, below turns.size - 1.
         """
+        from gearsim_sim.sensors.loops import passages
+
         if self._next is None:
             self._next = self._first_mark(int(turns[0]), float(fraction[0]))
         first = self._next
         reach = float(np.max(turns - turns[0] + fraction)) + 1.0
         out = np.empty(math.ceil(reach * self._marks) + 2)
-        count = _passages(
+        count = passages(
             turns, fraction, turns_per_sample, self._marks, self._phase, self._errors, first, out
         )
         self._next = first + count
@@ -76,52 +77,3 @@ class EdgeFinder:
         while self._phase + (mark / self._marks - turns) + self._errors[mark % self._marks] < fraction:
             mark += 1
         return mark
-
-
-@njit(cache=True, nogil=True)
-def _passages(turns, fraction, speed, marks, phase, errors, first, out):  # type: ignore[no-untyped-def]
-    count = 0
-    edge = first
-    edge_turns = edge // marks
-    mark = edge - edge_turns * marks
-    edge_fraction = phase + mark / marks + errors[mark]
-    for i in range(turns.size - 1):
-        end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
-        while end > 0.0:
-            start = (turns[i] - edge_turns) + (fraction[i] - edge_fraction)
-            at = i + _root(start, end, speed[i], speed[i + 1])
-            # Rounding must not push the edge into the next interval, and so out of its batch.
-            out[count] = min(at, np.nextafter(i + 1.0, 0.0))
-            count += 1
-            edge += 1
-            edge_turns = edge // marks
-            mark = edge - edge_turns * marks
-            edge_fraction = phase + mark / marks + errors[mark]
-            end = (turns[i + 1] - edge_turns) + (fraction[i + 1] - edge_fraction)
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _root(p0, p1, m0, m1):  # type: ignore[no-untyped-def]
-    # First zero in [0, 1) of the cubic with values p0 <= 0 < p1 and slopes m0, m1: Newton, kept in a bracket.
-    if p0 >= 0.0:
-        return 0.0
-    c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
-    c3 = 2.0 * (p0 - p1) + m0 + m1
-    low = 0.0
-    high = 1.0
-    s = p0 / (p0 - p1)
-    for _ in range(60):
-        value = p0 + s * (m0 + s * (c2 + s * c3))
-        if value > 0.0:
-            high = s
-        else:
-            low = s
-        slope = m0 + s * (2.0 * c2 + s * 3.0 * c3)
-        following = s - value / slope if slope > 0.0 else 0.5 * (low + high)
-        if not (low <= following <= high):
-            following = 0.5 * (low + high)
-        if abs(following - s) < 1e-15:
-            return following
-        s = following
-    return s

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.special import j0
 
 from gearsim_io.errors import InputError
 from gearsim_io.quantities import Si, Strict
@@ -115,6 +114,8 @@ class _Switching:
     """
 
     def __init__(self, settings: Inverter[float], rate_hz: float, seed: int) -> None:
+        from scipy.special import j0  # here, because it takes long to load
+
         phases = uniform(generator(seed, "inverter"), 2)
         self._carrier = PhaseClock(settings.carrier, rate_hz, float(phases[0]))
         self._output = PhaseClock(settings.output, rate_hz, float(phases[1]))

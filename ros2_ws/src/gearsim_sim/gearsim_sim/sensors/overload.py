@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
@@ -70,18 +69,6 @@ class OverloadRecovery:
 
     def apply(self, block: NDArray[np.float64], first_sample: int) -> None:  # noqa: ARG002
         """Limit `block` (channels, samples), which continues the block before."""
-        _limit(block, self._rows, self._numbers, self._shift)
+        from gearsim_sim.sensors.loops import limit_rows
 
-
-@njit(cache=True, nogil=True)
-def _limit(block, rows, numbers, shift):  # type: ignore[no-untyped-def]
-    for i in range(rows.size):
-        row = block[rows[i]]
-        limit, leak, keep = numbers[i]
-        d = shift[i]
-        for k in range(row.size):
-            x = row[k] - d
-            y = min(max(x, -limit), limit)
-            row[k] = y
-            d = d * keep + (x - y) * leak
-        shift[i] = d
+        limit_rows(block, self._rows, self._numbers, self._shift)

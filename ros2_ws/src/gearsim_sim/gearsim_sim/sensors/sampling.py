@@ -16,7 +16,6 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -100,22 +99,14 @@ class Decimator:
 
     def take(self, block: Array, first_sample: int, count: int) -> Array:
         """Take the samples from `end` to `wanted` and give the output samples."""
+        from gearsim_sim.sensors.loops import decimate_rows
+
         signal = np.concatenate([self._kept, block], axis=1) if self._kept.shape[1] else block
         out = np.empty((signal.shape[0], count))
-        _decimate(signal, self.factor * first_sample - self.half - self._begin, self.factor, self._taps, out)
+        start = self.factor * first_sample - self.half - self._begin
+        decimate_rows(signal, start, self.factor, self._taps, out)
         keep = self.factor * (first_sample + count) - self.half - self._begin
         keep = min(keep, signal.shape[1])
         self._begin += keep
         self._kept = signal[:, keep:].copy()
         return out
-
-
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def _decimate(signal, start, factor, taps, out):  # type: ignore[no-untyped-def]
-    for c in range(out.shape[0]):
-        for i in range(out.shape[1]):
-            window = signal[c, start + i * factor : start + i * factor + taps.size]
-            total = 0.0
-            for m in range(taps.size):
-                total += taps[m] * window[m]
-            out[c, i] = total
