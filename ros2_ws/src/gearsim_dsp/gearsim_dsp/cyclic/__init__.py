@@ -1,0 +1,1 @@
+"""Hidden periodicities of random signals: envelope spectra, spectral correlation and coherence."""
