@@ -4,7 +4,7 @@ An encoder with N lines is a carrier of N orders, phase-modulated by the shaft's
 that phase at whole cycles; a sampled wave is demodulated for it. Between two encoders the dynamic
 transmission error of a gear pair is what the driven wheel lags behind the place that the teeth give it,
 
-    e = theta_1 - theta_2 z_2 / z_1          (in the driving shaft's angle; times r_b1 along the line of action)
+    e = theta_1 - theta_2 z_2 / z_1     (in the driving shaft's angle; times r_b1 on the line of action)
 
 as in Sweeney and Randall, Proc. Inst. Mech. Eng. C 210 (1996) 223-235, who demodulate both encoders and
 subtract.
