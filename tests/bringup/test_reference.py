@@ -5,11 +5,14 @@ from typing import Annotated, Literal
 
 import pytest
 
+from gearsim_bringup.fault_places import scenarios_of
+from gearsim_bringup.gallery.cases import faults_of
 from gearsim_bringup.reference import Parameter, parameters, table
 from gearsim_bringup.reference_page import markdown, sections
 from gearsim_io.errors import InputError
 from gearsim_io.quantities import Si, Strict, validate
 from gearsim_sim.model.faults import REGISTRY
+from gearsim_sim.scenario import load_scenario, scenario_names
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 
@@ -64,9 +67,40 @@ def test_numbers_of_shipped_machines_have_sources():
             assert source, (machine, name)
 
 
+def test_a_kind_tells_where_it_can_be_how_great_and_what_shows_it():
+    (section,) = sections("outer_race_spall")
+    places = {place.machine: place for place in section.places}
+    rig = places["unsw_parallel"]
+    assert rig.models == ("lpm22", "lpm34")
+    assert rig.components == ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
+    limits = dict(rig.limits)
+    assert set(limits) == {"width_m", "depth_m", "row"}
+    assert limits["width_m"].startswith("less than 7.12 mm")
+    assert (limits["depth_m"], limits["row"]) == ("no upper limit", "1 to 2")
+    # Planets have bearings only where a scenario says so.
+    changed = places["unsw_planetary as in scenario planetary_bearing"]
+    assert changed.components == ("planet_1_bearing", "planet_2_bearing", "planet_3_bearing")
+    text = markdown([section], whole=False)
+    assert (
+        "| unsw_parallel | lpm22, lpm34 | bearing_1, bearing_2, bearing_3, bearing_4 | `width_m` less" in text
+    )
+    assert "Shown by: `cage_slip`, `demo`, " in text
+    assert section.content()["places"][0]["limits"]["row"] == "1 to 1"
+
+
+@pytest.mark.parametrize("kind", REGISTRY.values(), ids=REGISTRY)
+def test_the_named_scenarios_have_the_fault(kind):
+    names = scenarios_of(kind)
+    assert names
+    for name in names:
+        assert kind.name in {fault.kind for fault in faults_of(load_scenario(name))}
+    if kind.name in scenario_names():
+        assert names[0] == kind.name
+
+
 def test_unknown_sections_are_named():
-    with pytest.raises(InputError, match="scenario"):
-        sections("gear")
+    with pytest.raises(InputError, match="did you mean gear_wear"):
+        sections("gear_waer")
 
 
 def test_the_page_in_docs_is_up_to_date():

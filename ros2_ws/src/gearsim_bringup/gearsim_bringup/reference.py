@@ -11,6 +11,7 @@ import textwrap
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -75,7 +76,7 @@ def _meanings(model: type[BaseModel]) -> dict[str, str]:
 
 
 def _parameter(key: str, field: FieldInfo, meaning: str) -> Parameter:
-    si = next((mark for mark in _marks(field) if isinstance(mark, Si)), None)
+    si = si_of(field)
     return Parameter(
         name=key,
         unit="" if si is None else si.unit or "1",
@@ -83,6 +84,11 @@ def _parameter(key: str, field: FieldInfo, meaning: str) -> Parameter:
         default=_default(field),
         meaning=" ".join(meaning.split()),
     )
+
+
+def si_of(field: FieldInfo) -> Si | None:
+    """Unit and bounds of a field that is a physical number."""
+    return next((mark for mark in _marks(field) if isinstance(mark, Si)), None)
 
 
 def _marks(field: FieldInfo) -> list[Any]:
@@ -109,6 +115,8 @@ def _allowed(field: FieldInfo, si: Si | None) -> str:
     choices = [part for part in (kind, *get_args(kind)) if get_origin(part) is Literal]
     if choices:
         return ", ".join(str(choice) for choice in get_args(choices[0]))
+    if inspect.isclass(kind) and issubclass(kind, Enum):
+        return ", ".join(str(choice.value) for choice in kind)
     words = {bool: "true, false", int: "whole number", float: "number", str: "text"}
     known = [words[part] for part in (kind, *get_args(kind)) if part in words]
     return " ".join(part for part in (known[0] if known else "", bounds) if part)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 from pydantic import BaseModel
 
+from gearsim_bringup.fault_places import Place, places_of, scenarios_of
 from gearsim_bringup.reference import Parameter, parameters, table
 from gearsim_io.errors import InputError
 from gearsim_io.machines import machine_names, read_machine_file
-from gearsim_sim.model.faults import REGISTRY
+from gearsim_sim.model.faults import REGISTRY, FaultKind
 from gearsim_sim.params.kinds import MODEL_KINDS
 from gearsim_sim.scenario import ScenarioModel
 
@@ -20,7 +22,8 @@ _HEAD = """# Parameters
 Made by `./gearsim parameters --out docs/parameters.md` from what the program checks. Numbers in YAML carry
 their unit (`0.8 mm`, `10 Hz`) and are converted; in a key that names its unit (`width_m`) a bare number is in
 that unit. In machine descriptions each number is `{value, unit, source}`. `<name>` stands for a key of one's
-own, `[]` for an entry of a list.
+own, `[]` for an entry of a list. For each kind of fault follow the shipped machines that can have it, with
+the limits that they set, and the shipped scenarios that show it (`./gearsim run NAME`).
 """
 
 
@@ -32,6 +35,8 @@ class Section:
     summary: str
     rows: tuple[Parameter, ...]
     values: tuple[tuple[str, str, str, str], ...] = ()  # machine, parameter, value with unit, source
+    places: tuple[Place, ...] = ()
+    scenarios: tuple[str, ...] = ()  # shipped ones that show it
 
     def content(self) -> dict[str, Any]:
         """For programs."""
@@ -43,25 +48,33 @@ class Section:
                 dict(zip(("machine", "parameter", "value", "source"), row, strict=True))
                 for row in self.values
             ],
+            "places": [asdict(place) | {"limits": dict(place.limits)} for place in self.places],
+            "scenarios": list(self.scenarios),
         }
 
 
 def sections(only: str | None = None) -> list[Section]:
     """All sections, or the one of that name; InputError lists the names if there is none."""
-    found = [
-        Section("scenario", "The keys of a scenario file.", _rows(ScenarioModel)),
-        *(Section(kind.name, kind.summary, _rows(kind.params_model)) for kind in REGISTRY.values()),
-        *(
-            Section(name, f"The `model` section of a machine of kind {name}.", _rows(model), _values(name))
-            for name, model in MODEL_KINDS.items()
-        ),
-    ]
+    makers: dict[str, Callable[[], Section]] = {
+        "scenario": lambda: Section("scenario", "The keys of a scenario file.", _rows(ScenarioModel)),
+        **{name: partial(_of_fault, kind) for name, kind in REGISTRY.items()},
+        **{name: partial(_of_machine, name) for name in MODEL_KINDS},
+    }
     if only is None:
-        return found
-    chosen = [one for one in found if one.name == only]
-    if not chosen:
-        raise InputError("parameters", "section", only, "one of " + ", ".join(one.name for one in found))
-    return chosen
+        return [make() for make in makers.values()]
+    if only not in makers:
+        raise InputError("parameters", "section", only, "one of " + ", ".join(makers))
+    return [makers[only]()]
+
+
+def _of_fault(kind: FaultKind) -> Section:
+    rows = _rows(kind.params_model)
+    return Section(kind.name, kind.summary, rows, places=places_of(kind), scenarios=scenarios_of(kind))
+
+
+def _of_machine(name: str) -> Section:
+    summary = f"The `model` section of a machine of kind {name}."
+    return Section(name, summary, _rows(MODEL_KINDS[name]), _values(name))
 
 
 def markdown(chosen: Sequence[Section], *, whole: bool) -> str:
@@ -73,8 +86,20 @@ def markdown(chosen: Sequence[Section], *, whole: bool) -> str:
         if one.values:
             text += "\n\n| machine | parameter | value | source |\n|---|---|---|---|\n"
             text += "\n".join("| " + " | ".join(row) + " |" for row in one.values)
+        if one.places:
+            text += "\n\n" + _places(one)
         parts.append(text + "\n")
     return "\n".join(parts)
+
+
+def _places(one: Section) -> str:
+    """Who can have a fault, how great it can be there, and what shows it."""
+    lines = ["| machine | models | components | upper limits, on the first of them |", "|---|---|---|---|"]
+    for place in one.places:
+        limits = "; ".join(f"`{name}` {text}" for name, text in place.limits) or "as above"
+        cells = (place.machine, ", ".join(place.models), ", ".join(place.components), limits)
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n\nShown by: " + ", ".join(f"`{name}`" for name in one.scenarios) + "."
 
 
 def _rows(model: type[BaseModel]) -> tuple[Parameter, ...]:
