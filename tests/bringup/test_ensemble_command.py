@@ -78,6 +78,8 @@ def test_files_hold_what_the_engine_gives(tmp_path, capsys):
     with open(told["table"]) as table:
         rows = list(csv.DictReader(table))
     assert [row["name"] for row in rows] == ["v0", "v1", "plain"]
+    assert [row["seed"] for row in rows] == ["3", "4", "5"]
+    assert [repr(one["chosen"]["seed"]) for one in told["variants"]] == ["3", "4", "5"]
     assert 500 <= float(rows[0]["mesh.damping [N*s/m]"]) <= 900
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "plain.npz", "v0.npz", "v1.npz", "variants.csv",

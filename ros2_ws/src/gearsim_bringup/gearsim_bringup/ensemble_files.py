@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,8 +73,13 @@ def _run(
     del accel
     raw.unlink()
     listed = out / "variants.csv"
-    listed.write_text(table(spec.variants))
+    listed.write_text(table([replace(one, chosen=chosen(one)) for one in spec.variants]))
     return (*files, listed)
+
+
+def chosen(variant: NamedVariant) -> dict[str, float | str]:
+    """What was chosen for a variant; seeds are whole numbers, which large ones would lose as floats."""
+    return {**variant.chosen, "seed": variant.scenario.seed}
 
 
 def _save(

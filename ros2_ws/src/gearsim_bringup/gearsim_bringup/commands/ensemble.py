@@ -35,7 +35,7 @@ def command(spec: Path, seconds: float, out: Path, workers: int | None, json_mod
     voice = Voice(json_mode=json_mode)
     refuse_existing(out, "the name of a new folder")
     read_yaml(spec)
-    from gearsim_bringup.ensemble_files import run_to  # after what can be refused at once
+    from gearsim_bringup.ensemble_files import chosen, run_to  # after what can be refused at once
     from gearsim_sim.ensemble_spec import load_ensemble_spec
 
     loaded = load_ensemble_spec(spec)
@@ -60,7 +60,7 @@ def command(spec: Path, seconds: float, out: Path, workers: int | None, json_mod
             "sample_rate_hz": loaded.base.sample_rate_hz,
             "seconds": seconds,
             "variants": [
-                {"name": one.name, "file": str(file), "chosen": dict(one.chosen)}
+                {"name": one.name, "file": str(file), "chosen": chosen(one)}
                 for one, file in zip(loaded.variants, files, strict=False)
             ],
             "table": str(files[-1]),
