@@ -12,6 +12,7 @@ import pytest
 from gearsim_bringup import cli
 from gearsim_bringup.ui import JobFailedError, plain
 from gearsim_io.errors import EnvironmentLackError, InputError
+from gearsim_sim.scenario import scenario_names
 
 COMMANDS = sorted(cli.COMMANDS)
 
@@ -95,6 +96,19 @@ def test_bad_usage_is_one_line_and_status_2(words, expected, tmp_path):
     assert len(done.stderr.strip().splitlines()) == 1
     assert done.stdout == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_scenarios_are_listed_with_a_line_each(capsys):
+    assert cli.main(["scenarios"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(scenario_names())
+    assert all(len(line.split()) > 3 for line in lines)
+    assert cli.main(["scenarios", "Crack", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["scenarios"]
+    assert {"gear_tooth_crack", "planetary_crack", "planetary_hunting"} == {one["name"] for one in found}
+    assert "root crack" in found[0]["description"]
+    assert cli.main(["scenarios", "zebra"]) == 2
+    assert "got zebra" in capsys.readouterr().err
 
 
 def test_json_never_holds_nan():

@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "demo",
     "run": "run",
     "simulate": "simulate",
+    "scenarios": "scenarios",
     "ensemble": "ensemble",
     "import": "import_files",
     "record": "record",

@@ -207,6 +207,11 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
+def scenario_summary(name: str) -> str:
+    """What a shipped scenario shows, in one line; its file is not checked."""
+    return " ".join(str(read_yaml(scenario_file(name)).get("description", "")).split())
+
+
 def scenario_file(name_or_path: str | Path) -> Path:
     """The file of a scenario: a shipped name, or the path of a YAML file; InputError if it is neither."""
     text = str(name_or_path)
