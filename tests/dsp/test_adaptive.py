@@ -1,5 +1,7 @@
 """Self-adaptive noise cancellation: the rule written out, portions, theory of the line enhancer, a record."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from bearing_signals import defect, noise, rotating_lines, turns_of
@@ -36,7 +38,7 @@ def test_portions_change_no_bit():
     whole = SelfAdaptiveCanceller(20, 33).push(x)
     canceller = SelfAdaptiveCanceller(20, 33)
     cuts = [0, 1, 2, 40, 41, 1000, 1000, 4999, 5000]
-    parts = [canceller.push(x[a:b]) for a, b in zip(cuts, cuts[1:], strict=False)]
+    parts = [canceller.push(x[a:b]) for a, b in pairwise(cuts)]
     for k in range(2):
         assert np.array_equal(whole[k], np.concatenate([part[k] for part in parts]))
 

@@ -27,7 +27,7 @@ from gearsim_dsp.kurtogram import Kurtogram, KurtogramNode, fast_kurtogram, larg
 from gearsim_dsp.spectra import welch_psd
 from gearsim_io.errors import InputError
 
-__all__ = ["BandChoice", "choose_band", "rolloff_hz"]
+__all__ = ["BandChoice", "choose_band", "levels_for", "refusal", "rolloff_hz", "usable_ceiling_hz"]
 
 _SEGMENTS = 8
 _LEAST_SHARE = 1e-5
@@ -73,13 +73,22 @@ def choose_band(
     if not 0 < least_width_hz < 0.5 * sample_rate_hz:
         raise InputError("choose_band", "least_width_hz", least_width_hz, f"0 to {0.5 * sample_rate_hz:g} Hz")
     if levels is None:
-        levels = max(1, int(np.log2(0.5 * sample_rate_hz / least_width_hz)))
+        levels = levels_for(least_width_hz, sample_rate_hz)
     levels = min(levels, largest_level(x.size))
     spectrum = suppress_lines(window_spectrum(x, sample_rate_hz))
     clean = sfft.irfft(spectrum.lines, n=spectrum.samples).astype(np.float32)
     kurtogram = fast_kurtogram(clean, sample_rate_hz, levels, _SEGMENTS)
-    ceiling = min(TOP_SHARE * sample_rate_hz, rolloff_hz(x, sample_rate_hz))
-    return _choose(kurtogram, ceiling, least_width_hz)
+    return _choose(kurtogram, usable_ceiling_hz(x, sample_rate_hz), least_width_hz)
+
+
+def levels_for(least_width_hz: float, sample_rate_hz: float) -> int:
+    """Depth of a binary tree whose narrowest bands are still as wide as that; at least 1."""
+    return max(1, int(np.log2(0.5 * sample_rate_hz / least_width_hz)))
+
+
+def usable_ceiling_hz(samples: NDArray[np.float32] | NDArray[np.float64], sample_rate_hz: float) -> float:
+    """Highest frequency of use: below the anti-alias filter's roll-off and 0.46 of the sampling rate."""
+    return min(TOP_SHARE * sample_rate_hz, rolloff_hz(samples, sample_rate_hz))
 
 
 def _choose(kurtogram: Kurtogram, ceiling_hz: float, least_width_hz: float) -> BandChoice:
@@ -91,7 +100,9 @@ def _choose(kurtogram: Kurtogram, ceiling_hz: float, least_width_hz: float) -> B
             if node.width_hz >= least_width_hz:
                 break
             continue
-        why = _guard(node, total, ceiling_hz, least_width_hz)
+        # A real band has twice the power of its complex envelope.
+        share = 2 * node.mean_square / max(total, 1e-300)
+        why = refusal(node.low_hz, node.high_hz, share, ceiling_hz, least_width_hz)
         if not why:
             band = Band(max(node.low_hz, 1e-3 * node.width_hz), node.high_hz, "kurtogram")
             return BandChoice(band, node.segment_kurtosis, tuple(rejected))
@@ -101,13 +112,14 @@ def _choose(kurtogram: Kurtogram, ceiling_hz: float, least_width_hz: float) -> B
     return BandChoice(None, 0.0, tuple(rejected))
 
 
-def _guard(node: KurtogramNode, total: float, ceiling_hz: float, least_width_hz: float) -> str:
-    if node.width_hz < least_width_hz:
+def refusal(low_hz: float, high_hz: float, share: float, ceiling_hz: float, least_width_hz: float) -> str:
+    """Why a band is not fit to be demodulated, or nothing; `share` is its part of the signal's power."""
+    width_hz = high_hz - low_hz
+    if width_hz < least_width_hz:
         return f"narrower than {least_width_hz:.0f} Hz"
-    if node.high_hz - ceiling_hz > _OVERHANG * node.width_hz:
+    if high_hz - ceiling_hz > _OVERHANG * width_hz:
         return f"reaches beyond {ceiling_hz:.0f} Hz, where the signal has rolled off"
-    # A real band has twice the power of its complex envelope.
-    if 2 * node.mean_square < _LEAST_SHARE * total:
+    if share < _LEAST_SHARE:
         return "holds hardly any energy"
     return ""
 

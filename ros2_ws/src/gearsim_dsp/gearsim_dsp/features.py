@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 
-__all__ = ["crest_factor", "kurtosis", "rms"]
+__all__ = [
+    "clearance_factor",
+    "crest_factor",
+    "impulse_factor",
+    "kurtosis",
+    "peak",
+    "rms",
+    "shape_factor",
+    "skewness",
+]
 
 Samples = NDArray[np.float32] | NDArray[np.float64]
 
@@ -31,6 +40,43 @@ def crest_factor(samples: Samples) -> float:
     x = _centred(samples)
     effective = math.sqrt(float(np.mean(x**2)))
     return float(np.max(np.abs(x))) / effective if effective > 0 else float("nan")
+
+
+def peak(samples: Samples) -> float:
+    """Largest magnitude, in the signal's unit."""
+    return float(np.max(np.abs(_centred(samples))))
+
+
+def skewness(samples: Samples) -> float:
+    """Third moment over the second to the power 3/2: 0 for anything symmetrical; NaN for a constant."""
+    x = _centred(samples)
+    second = float(np.mean(x**2))
+    return float(np.mean(x**3)) / second**1.5 if second > 0 else float("nan")
+
+
+def shape_factor(samples: Samples) -> float:
+    """RMS over the mean magnitude: pi / sqrt(8) for a sine, sqrt(pi / 2) for Gaussian noise."""
+    x = _centred(samples)
+    return _ratio(math.sqrt(float(np.mean(x**2))), float(np.mean(np.abs(x))))
+
+
+def impulse_factor(samples: Samples) -> float:
+    """Largest magnitude over the mean magnitude: pi / 2 for a sine; NaN for a constant."""
+    magnitude = np.abs(_centred(samples))
+    return _ratio(float(np.max(magnitude)), float(np.mean(magnitude)))
+
+
+def clearance_factor(samples: Samples) -> float:
+    """Largest magnitude over the square of the mean root of the magnitudes; NaN for a constant.
+
+    It answers to spalls early and falls again as they spread.
+    """
+    magnitude = np.abs(_centred(samples))
+    return _ratio(float(np.max(magnitude)), float(np.mean(np.sqrt(magnitude))) ** 2)
+
+
+def _ratio(value: float, over: float) -> float:
+    return value / over if over > 0 else float("nan")
 
 
 def _centred(samples: Samples) -> NDArray[np.float64]:

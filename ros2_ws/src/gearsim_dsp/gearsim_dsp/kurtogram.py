@@ -9,8 +9,9 @@ time-domain programs when the length is a multiple of 3 * 2^levels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,12 +116,16 @@ class _Tree:
     ) -> None:
         self._x, self._rate, self._levels, self._segments = x, sample_rate_hz, levels, segments
         low = firwin(_ORDER + 1, _CUTOFF)
-        self._h = low * np.exp(2j * np.pi * np.arange(_ORDER + 1) * 0.125)
+        h = low * np.exp(2j * np.pi * np.arange(_ORDER + 1) * 0.125)
         n = np.arange(2, _ORDER + 2)
-        self._g = self._h[(1 - n) % _ORDER] * (-1.0) ** (1 - n)
+        g = h[(1 - n) % _ORDER] * (-1.0) ** (1 - n)
+        self._skips = (h.size - 1, g.size - 1)
         taps = 3 * _ORDER // 2 + 1
         third = firwin(taps, 2 / 3 * _CUTOFF) * np.exp(2j * np.pi * np.arange(taps) * 0.25 / 3)
-        self._thirds = [third * np.exp(2j * np.pi * np.arange(taps) * k / 6) for k in range(3)]
+        thirds = [third * np.exp(2j * np.pi * np.arange(taps) * k / 6) for k in range(3)]
+        complex_type = np.result_type(x.dtype, np.complex64)
+        self._pair = _responses((h, g), 1, 0.5, x.size, complex_type)
+        self._triple = _responses(thirds, 2, 1 / 3, x.size, complex_type)
 
     def nodes(self) -> Iterator[KurtogramNode]:
         square = self._x.astype(np.float64) ** 2
@@ -134,33 +139,22 @@ class _Tree:
         for level in range(1, self._levels + 1):
             parent = lines
             lines = self._halves(parent)
-            yield from self._judged(lines, float(level), (len(self._h) - 1, len(self._g) - 1))
+            yield from self._judged(lines, float(level), self._skips)
             if level < self._levels:
                 thirds = float(level + np.log2(3) - 1)
                 yield from self._judged(self._split_in_three(parent), thirds, (_ORDER,))
 
     def _halves(self, lines: _Lines) -> _Lines:
         """The lower and the upper half of every node, decimated by two (samples 1, 3, 5 ...)."""
-        count = lines.shape[1]
-        advance = np.exp(2j * np.pi * np.arange(count) / count)
-        parts = []
-        for taps in (self._h, self._g):
-            response = (sfft.fft(taps, count) * advance).astype(lines.dtype)
-            product = lines * response
-            parts.append(0.5 * (product[:, : count // 2] + product[:, count // 2 :]))
+        halves = _filtered(lines, self._pair)
         # The upper half lies mirrored around a quarter of the rate: times (-1)^n for n = 1, 2, ...
-        parts[1] = -np.roll(parts[1], count // 4, axis=1)
-        return _interleaved(parts).astype(lines.dtype)
+        upper = halves[1::2]
+        halves[1::2] = np.roll(upper, upper.shape[1] // 2, axis=1)
+        np.negative(halves[1::2], out=halves[1::2])
+        return halves
 
     def _split_in_three(self, lines: _Lines) -> _Lines:
-        count = lines.shape[1]
-        advance = np.exp(4j * np.pi * np.arange(count) / count)
-        parts = []
-        for taps in self._thirds:
-            response = (sfft.fft(taps, count) * advance).astype(lines.dtype)
-            folded = (lines * response).reshape(lines.shape[0], 3, count // 3).sum(axis=1)
-            parts.append(folded / 3)
-        return _interleaved(parts).astype(lines.dtype)
+        return _filtered(lines, self._triple)
 
     def _judged(self, lines: _Lines, level: float, skips: tuple[int, ...]) -> Iterator[KurtogramNode]:
         """Nodes of one level; row k of `lines` drops its first skips[k % len(skips)] samples."""
@@ -191,10 +185,37 @@ class _Tree:
         return _excess(all_second, all_fourth), median, all_second
 
 
-def _interleaved(parts: list[_Lines]) -> _Lines:
-    """Rows of all parts of the first node, then of the second, and so on."""
-    stacked = np.stack(parts, axis=1)
-    return stacked.reshape(-1, stacked.shape[2])
+def _responses(
+    taps: Sequence[NDArray[np.complex128]], advance: int, gain: float, count: int, kind: np.dtype[Any]
+) -> list[_Lines]:
+    """Frequency responses over `count` lines, times the advance by so many samples, times a gain."""
+    responses: list[_Lines] = []
+    for filter_taps in taps:
+        early = np.zeros(count, dtype=kind)
+        early[np.arange(filter_taps.size) - advance] = gain * filter_taps
+        responses.append(sfft.fft(early, overwrite_x=True))
+    return responses
+
+
+def _filtered(lines: _Lines, responses: list[_Lines]) -> _Lines:
+    """Every row through every filter, decimated by their number: rows of the first node, then the second.
+
+    The response of a filter over fewer lines is every so-manieth value of that over more.
+    """
+    rows, count = lines.shape
+    folds = len(responses)
+    kept = count // folds
+    result = np.empty((rows, folds, kept), dtype=lines.dtype)
+    part = np.empty((rows, kept), dtype=lines.dtype)
+    for k, response in enumerate(responses):
+        short = response[:: response.size // count]
+        target = result[:, k]
+        np.multiply(lines[:, :kept], short[:kept], out=target)
+        for fold in range(1, folds):
+            some = slice(fold * kept, (fold + 1) * kept)
+            np.multiply(lines[:, some], short[some], out=part)
+            target += part
+    return result.reshape(rows * folds, kept)
 
 
 def _centred_square(z: _Lines) -> NDArray[np.floating]:

@@ -34,8 +34,8 @@ class SelfAdaptiveCanceller:
         of amplitude A in white noise of variance v passes with the gain g / (1 + g), g = length A^2 / (4 v)
         (Zeidler et al., IEEE Trans. Acoust. Speech Signal Process. 26 (1978) 240-254).
     step : float
-        Between 0 and 2: a line that makes up the share s of the power is learnt in about 2 / (step s) samples,
-        and step / (2 - step) of the random part's power comes with the deterministic part.
+        Between 0 and 2: a line that makes up the share s of the power is learnt in about 2 / (step s)
+        samples, and step / (2 - step) of the random part's power comes with the deterministic part.
     """
 
     __slots__ = ("_delay", "_held", "_step", "_weights")

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft as sfft
+from scipy.signal.windows import tukey
 
 from gearsim_dsp.separation.checks import checked_signal
 from gearsim_io.errors import InputError
@@ -46,7 +47,11 @@ def real_cepstrum(signal: ArrayLike) -> NDArray[np.float64]:
 
 
 def prewhitened(
-    signal: ArrayLike, *, band_hz: tuple[float, float] | None = None, sample_rate_hz: float = 1.0
+    signal: ArrayLike,
+    *,
+    band_hz: tuple[float, float] | None = None,
+    sample_rate_hz: float = 1.0,
+    tapered_share: float = 0.01,
 ) -> NDArray[np.float64]:
     """The signal with every line of its spectrum at the same magnitude, the geometric mean of all (CPW).
 
@@ -56,9 +61,13 @@ def prewhitened(
         Finite samples, at least 16.
     band_hz : (float, float), optional
         Lines outside are set to zero. Without it empty bands, such as those beyond an anti-alias filter, are
-        raised to the level of all others, and what little is in them may rule the result.
+        raised to the level of all others.
     sample_rate_hz : float
         For `band_hz` only.
+    tapered_share : float
+        Share of the signal faded in at its beginning and out at its end. The spectrum takes the signal to
+        repeat itself; the jump from its end to its beginning is all that is found in empty bands, and raised
+        with them it is a knock at the record's ends that outdoes everything else.
 
     Returns
     -------
@@ -66,7 +75,9 @@ def prewhitened(
         In the signal's unit. All zeros for a signal of zeros.
     """
     x = checked_signal("prewhitened", signal, _LEAST_SAMPLES)
-    lines = sfft.rfft(x)
+    if not 0.0 <= tapered_share <= 0.5:
+        raise InputError("prewhitened", "tapered_share", tapered_share, "0 to 0.5")
+    lines = sfft.rfft((x - np.mean(x)) * tukey(x.size, 2 * tapered_share) if tapered_share else x)
     if band_hz is not None:
         low, high = band_hz
         if not 0.0 <= low < high <= 0.5 * sample_rate_hz:

@@ -241,7 +241,7 @@ class _Record:
         return np.asarray(products[::-1])
 
     def _correlations(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sum over the outputs' windows of x[n - i] x[n - j]; each diagonal follows from its first element."""
+        """Sum over the outputs' windows of x[n - i] x[n - j], each diagonal from its first element."""
         length, count = self._length, self._count
         matrix = np.empty((length, length))
         matrix[0] = matrix[:, 0] = self._against(x[length - 1 :])
