@@ -122,7 +122,7 @@ def test_a_stream_that_changes_is_refused(tmp_path, record):
     batches = objects_of(record)
     last = next(b for b in reversed(batches) if isinstance(b, SampleBatch))
     changed = [
-        (dataclasses.replace(last, sample_rate_hz=8192.0), "sample_rate_hz: got 8192.0, expected 4096.0"),
+        (dataclasses.replace(last, sample_rate_hz=8192.0), "sample_rate_hz: got 8192 Hz, expected 4096.0"),
         (dataclasses.replace(last, channels=("x", "y")), "channels"),
         (dataclasses.replace(last, unit="g"), "unit: got g, expected m/s^2"),
     ]
