@@ -114,8 +114,8 @@ def test_it_learns_for_as_long_as_it_should_and_then_judges():
     assert watch.present.stale
     assert watch.present.note == "no baseline to judge by: learning 30 of 60 s"
     run(watch, [healthy(rng) for _ in range(61)], 60)
-    assert watch.monitor.baseline_words == "learnt from 60 s"
-    assert watch.monitor.baseline.tests == 2
+    assert watch.monitor.keeper.words == "learnt from 60 s"
+    assert watch.monitor.keeper.baseline.tests == 2
     assert not any(run(watch, [healthy(rng) for _ in range(400)], 121))
     assert not watch.present.stale
     steps = run(watch, [(9.0, 3.0)] * 12, 521)
@@ -181,7 +181,7 @@ def test_a_speed_that_was_not_learnt_is_not_judged_and_can_be_added():
 
     assert not any(at_20(k, 9.0) for k in range(122, 200))
     assert watch.present.note == "no baseline at 20 Hz: it was learnt near 9.85 Hz"
-    watch.monitor.learn(60.0, extend=True)
+    watch.monitor.keeper.learn(60.0, extend=True)
     for k in range(200, 330):
         at_20(k, 8.0 * math.exp(0.05 * rng.standard_normal()))
     assert not any(at_20(k, 8.1) for k in range(330, 360))
@@ -213,10 +213,10 @@ def test_trends_are_told_every_ten_seconds_with_limit_and_time_to_it():
 def test_learning_is_given_up_when_something_speaks_against_a_healthy_machine():
     watch = monitor()
     run(watch, [(2.0, 3.0)] * 40)
-    assert watch.monitor.disturb("an alarm came: outer race of bearing_3")
-    assert not watch.monitor.disturb("again")
+    assert watch.monitor.keeper.disturb("an alarm came: outer race of bearing_3")
+    assert not watch.monitor.keeper.disturb("again")
     run(watch, [(2.0, 3.0)] * 200, 40)
-    assert watch.monitor.baseline is None
+    assert watch.monitor.keeper.baseline is None
     assert "learning was given up, an alarm came: outer race of bearing_3" in watch.present.note
 
 
@@ -274,4 +274,4 @@ def test_impossible_settings_are_refused(bad):
     with pytest.raises(InputError, match="trend settings"):
         TrendSettings(**bad)
     with pytest.raises(InputError, match="a finite time above 0 s"):
-        TrendMonitor(MACHINE).learn(-3.0)
+        TrendMonitor(MACHINE).keeper.learn(-3.0)

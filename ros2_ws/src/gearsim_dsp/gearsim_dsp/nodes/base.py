@@ -17,8 +17,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 
 from gearsim_dsp.alarms import format_alarm
-from gearsim_dsp.nodes.parameters import MonitorParameters
-from gearsim_dsp.results import Alarm
+from gearsim_dsp.nodes.parameters import AlarmParameters
+from gearsim_dsp.nodes.services import AlarmServices
+from gearsim_dsp.results import Alarm, AlarmState, Features
 from gearsim_dsp.streams.feed import BatchQueue, StateKeeper, StreamStatus, StreamWatch
 from gearsim_dsp.streams.report import AlarmedMonitor, Outcome
 from gearsim_io import qos
@@ -35,22 +36,26 @@ DRAIN_S = 3.0
 class MonitorNode(Node):
     """A monitor on the topics of a source.
 
-    `make_monitor(machine, parameters=...)` makes the monitor; `source` names the node and what it publishes.
+    `make_monitor(machine, parameters=...)` makes the monitor; `source` names the node and what it publishes,
+    `inputs` are the topics whose messages the monitor takes.
     """
 
     def __init__(
         self,
         source: str,
-        parameters: type[MonitorParameters],
+        parameters: type[AlarmParameters],
         make_monitor: Callable[[Machine, Any], AlarmedMonitor],
+        inputs: tuple[qos.Topic, ...] = (qos.ACCEL, qos.TACHO),
     ) -> None:
         super().__init__(source, namespace=qos.NAMESPACE)
         given = declare_parameters(self, parameters)
         given.check()
+        self._given: Any = given
         self._make_monitor = partial(make_monitor, parameters=given)
         self._patience_s = given.patience_s
         self._queue = BatchQueue(given.queue_s)
-        self._watch = StreamWatch(time.monotonic, given.stale_after_s, self.get_logger().warning)
+        what = "samples" if qos.ACCEL in inputs else "indicators"
+        self._watch = StreamWatch(time.monotonic, given.stale_after_s, self.get_logger().warning, what=what)
         self._health = HealthPublisher(self)
         self._keeper = StateKeeper(source)
         self._types = ros_types()
@@ -58,6 +63,7 @@ class MonitorNode(Node):
         self._machine_error = ""
         self._next_monitor: AlarmedMonitor | None = None
         self._monitor: AlarmedMonitor | None = None
+        self._judging = threading.Lock()
         self._failure: BaseException | None = None
         self._latency_ms = self._worst_ms = 0.0
         self._failed_sends = 0
@@ -68,8 +74,10 @@ class MonitorNode(Node):
         self._features, self._spectrum, self._alarm, self._alarm_state = made
         self._inputs = [qos.MACHINE_INFO]
         qos.create_subscription(self, qos.MACHINE_INFO, self._on_machine)
-        self._listen(qos.ACCEL)
-        self._listen(qos.TACHO)
+        for topic in inputs:
+            self._listen(topic)
+        self._alarm_services = AlarmServices(self, self._change)
+        self._news = self.create_guard_condition(self._report_alarms)
         self._worker = threading.Thread(target=self._work, name=f"{source} analysis", daemon=True)
         self._timer = self.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -96,7 +104,8 @@ class MonitorNode(Node):
             return
         self._machine, self._machine_error = machine, ""
         self._health.health.hardware_id = machine.name
-        if not machine.tacho_shafts and machine.encoder_shafts and qos.ENCODER not in self._inputs:
+        angle = qos.TACHO in self._inputs and qos.ENCODER not in self._inputs
+        if angle and not machine.tacho_shafts and machine.encoder_shafts:
             self._listen(qos.ENCODER)
         self._next_monitor = monitor
         if not self._worker.is_alive() and self._failure is None:
@@ -104,7 +113,7 @@ class MonitorNode(Node):
 
     def _on_batch(self, topic: qos.Topic, msg: Any) -> None:
         try:
-            batch = from_msg(msg)
+            batch = from_msg(msg, Features) if topic == qos.FEATURES else from_msg(msg)
         except (InputError, ValueError) as error:
             self._watch.refused(topic.name, str(error))
             return
@@ -129,16 +138,34 @@ class MonitorNode(Node):
                 self._tell(self._monitor.withdraw("another nameplate came"))
                 self._keeper.judged(self._monitor.present)
                 self._send(self._alarm_state, self._keeper.state)
+                self._news.trigger()
             self._monitor = monitor
         assert self._monitor is not None
-        for outcome in self._monitor.push(batch):
-            self._publish(outcome)
+        with self._judging:
+            outcomes = self._monitor.push(batch)
+            for outcome in outcomes:
+                self._publish(outcome)
+        if outcomes:
             self._latency_ms = 1e3 * (time.monotonic() - arrival_s)
             self._worst_ms = max(self._worst_ms, self._latency_ms)
+
+    def _change(self, act: Callable[[AlarmedMonitor], list[Alarm]]) -> list[Alarm]:
+        """Somebody acknowledges or resets alarms; what comes of it is told before this returns."""
+        with self._judging:
+            if self._monitor is None:
+                return []
+            alarms = act(self._monitor)
+            self._tell(alarms)
+            if alarms:
+                self._send(self._alarm_state, self._keeper.changed(self._monitor.present))
+                self._news.trigger()
+        return alarms
 
     def _publish(self, outcome: Outcome) -> None:
         self._tell(outcome.alarms)
         self._keeper.judged(outcome.present)
+        if outcome.alarms:
+            self._news.trigger()  # the executor's thread tells /diagnostics at once
         if outcome.state_due:
             self._send(self._alarm_state, outcome.present)
         for features in outcome.report.features:
@@ -184,12 +211,14 @@ class MonitorNode(Node):
 
     def _report_alarms(self) -> None:
         state = self._keeper.state
-        words = "; ".join(alarm.reason for alarm in state.active) or state.note or "no alarm"
-        latency = {
+        values: dict[str, object] = {alarm.alarm_id: _in_short(alarm) for alarm in state.active}
+        values |= {
             "latency of the last window [ms]": self._latency_ms,
             "longest latency [ms]": self._worst_ms,
+            "messages not sent": self._failed_sends,
         }
-        self._health.report("alarms", state.level, words, latency | {"messages not sent": self._failed_sends})
+        level, words = _in_words(state)
+        self._health.report("alarms", level, words, values)
 
     def _check_types(self) -> None:
         for topic in self._inputs:
@@ -200,3 +229,18 @@ class MonitorNode(Node):
                         who = "a node without a name yet"
                     words = f"{topic.name}: {who} sends {info.topic_type}, expected {topic.type}"
                     self._watch.lasting(f"type {topic.name} {who}", words)
+
+
+def _in_short(alarm: Alarm) -> str:
+    marks = [alarm.level.name]
+    marks += ["acknowledged"] if alarm.acknowledged else []
+    marks += [] if alarm.present else ["gone, latched"]
+    return ", ".join(marks)
+
+
+def _in_words(state: AlarmState) -> tuple[Level, str]:
+    """Level and message for /diagnostics: STALE where nothing can be judged at present."""
+    told = "; ".join(alarm.reason for alarm in state.active)
+    if state.stale:
+        return Level.STALE, "; ".join(part for part in (state.note, told) if part)
+    return state.level, told or "no alarm"

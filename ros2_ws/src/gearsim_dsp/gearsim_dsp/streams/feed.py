@@ -9,12 +9,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearsim_dsp.results import AlarmState
+from gearsim_dsp.results import AlarmState, Features
 from gearsim_dsp.streams.assembler import Batch, WindowAssembler
 from gearsim_io.batches import SampleBatch
 from gearsim_io.health import Level
 
 __all__ = ["BatchQueue", "StateKeeper", "StreamStatus", "StreamWatch", "Verdict"]
+
+
+Item = Batch | Features
+"""What a node's analysis takes."""
 
 
 class BatchQueue:
@@ -30,7 +34,7 @@ class BatchQueue:
         self.limit_s = limit_s
         self.dropped = 0
         self.dropped_samples = 0
-        self._items: deque[tuple[float, Batch]] = deque()
+        self._items: deque[tuple[float, Item]] = deque()
         self._seconds = 0.0
         self._open = True
         self._changed = threading.Condition()
@@ -40,7 +44,7 @@ class BatchQueue:
         """Signal that waits."""
         return self._seconds
 
-    def put(self, arrival_s: float, batch: Batch) -> None:
+    def put(self, arrival_s: float, batch: Item) -> None:
         """Append a batch; never blocks."""
         with self._changed:
             self._items.append((arrival_s, batch))
@@ -54,7 +58,7 @@ class BatchQueue:
                 self.dropped_samples += old.sample_count if isinstance(old, SampleBatch) else 0
             self._changed.notify()
 
-    def get(self, timeout_s: float) -> tuple[float, Batch] | None:
+    def get(self, timeout_s: float) -> tuple[float, Item] | None:
         """The oldest batch with its arrival; None if none came in time or the queue is closed and empty."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or not self._open, timeout_s)
@@ -71,7 +75,7 @@ class BatchQueue:
             self._changed.notify_all()
 
 
-def _seconds(batch: Batch) -> float:
+def _seconds(batch: Item) -> float:
     return batch.sample_count / batch.sample_rate_hz if isinstance(batch, SampleBatch) else 0.0
 
 
@@ -91,8 +95,10 @@ class StreamStatus:
     last_note: str = ""
 
     @classmethod
-    def of(cls, assembler: WindowAssembler, queue: BatchQueue) -> StreamStatus:
+    def of(cls, assembler: WindowAssembler | None, queue: BatchQueue) -> StreamStatus:
         """The present numbers of a node's assembler and queue."""
+        if assembler is None:
+            return cls(dropped_batches=queue.dropped, queued_s=queue.seconds)
         counts = assembler.counts
         return cls(
             *assembler.stream_counts,
@@ -127,6 +133,8 @@ class StreamWatch:
         How long a trouble that is over is still told.
     log : callable
         Receives each new trouble once, as one line.
+    what : str
+        What the stream brings, for people.
     """
 
     def __init__(
@@ -135,11 +143,13 @@ class StreamWatch:
         stale_after_s: float,
         log: Callable[[str], None],
         remember_s: float = 10.0,
+        what: str = "samples",
     ) -> None:
         self._clock_s = clock_s
         self._stale_after_s = stale_after_s
         self._remember_s = remember_s
         self._log = log
+        self._what = what
         self._started_s = clock_s()
         self._last_s: float | None = None
         self._before = StreamStatus()
@@ -160,12 +170,14 @@ class StreamWatch:
         """True when no samples have come for too long."""
         return self.silent_s > self._stale_after_s
 
-    def received(self, batch: Batch) -> None:
-        """A batch arrived and could be read."""
-        if not isinstance(batch, SampleBatch):
+    def received(self, batch: Item) -> None:
+        """A batch, or a message with indicators, arrived and could be read."""
+        if not isinstance(batch, (SampleBatch, Features)):
             return
         self.batches += 1
         self._last_s = self._clock_s()
+        if isinstance(batch, Features):
+            return
         if not np.isfinite(batch.data).all():
             self.not_finite += 1
             bad = [c for c, row in zip(batch.channels, batch.data, strict=True) if not np.isfinite(row).all()]
@@ -211,13 +223,13 @@ class StreamWatch:
             "signal waiting [s]": float(status.queued_s),
         }
         if self.stale:
-            what = "no samples yet" if self._last_s is None else "no samples"
-            return Verdict(Level.STALE, f"{what} for {self.silent_s:.0f} s", values)
+            yet = " yet" if self._last_s is None else ""
+            return Verdict(Level.STALE, f"no {self._what}{yet} for {self.silent_s:.0f} s", values)
         if self._trouble and self._clock_s() - self._trouble[0] <= self._remember_s:
             return Verdict(Level.WARN, self._trouble[1], values)
         if self._last_s is None:
-            return Verdict(Level.OK, "waiting for samples", values)
-        return Verdict(Level.OK, "samples arrive", values)
+            return Verdict(Level.OK, f"waiting for {self._what}", values)
+        return Verdict(Level.OK, f"{self._what} arrive", values)
 
     def _notice(self, status: StreamStatus) -> None:
         before, self._before = self._before, status
@@ -245,6 +257,15 @@ class StateKeeper:
         with self._lock:
             self.state = self._judged = state
             self._trouble = ""
+
+    def changed(self, state: AlarmState) -> AlarmState:
+        """Somebody acknowledged or reset alarms: the state to publish, with the trouble there is."""
+        with self._lock:
+            self._judged = state
+            if self._trouble:
+                state = replace(state, stale=True, note=self.state.note)
+            self.state = state
+            return state
 
     def troubled(self, kind: str, words: str) -> AlarmState | None:
         """What keeps the node from judging (`kind` empty: nothing); the state to publish if that is news."""

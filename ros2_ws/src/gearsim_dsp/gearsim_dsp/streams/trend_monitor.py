@@ -13,7 +13,8 @@ from gearsim_dsp.alarms import AlarmSettings, Indication, Thresholds
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Features, Trends, TrendValue
 from gearsim_dsp.streams.assembler import WindowAssembler
-from gearsim_dsp.streams.baseline import Baseline, BaselineLearner, Key, Standing, speed_step
+from gearsim_dsp.streams.baseline import Baseline, Key, Standing, speed_step
+from gearsim_dsp.streams.baseline_keeper import BaselineKeeper
 from gearsim_dsp.streams.feature_kinds import kind_of
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.streams.trend import Slope, TrendHistory
@@ -95,66 +96,22 @@ class TrendMonitor:
         self.source = source
         self.assembler: WindowAssembler | None = None
         self.alarms = alarms or AlarmSettings()
-        self.baseline = baseline
-        self.learnt: Baseline | None = None
+        self.keeper = BaselineKeeper(
+            machine.name, self.settings.learn_s, baseline, self.settings.learn_at_start
+        )
         self.ignored = 0
         self._series: dict[Key, _Series] = {}
-        self._learner: BaselineLearner | None = None
-        self._learn_s = self.settings.learn_s
-        self._extend = False
-        self._began_ns: int | None = None
         self._t_ns = 0
         self._sample = 0
         self._latest: dict[str, int] = {}
         self._warn = math.nan
         self._sent_ns: int | None = None
         self._run = 0
-        self._why_none = ""
-        if baseline is None and self.settings.learn_at_start:
-            self.learn()
 
     @property
     def hop_s(self) -> float:
         """Distance of two windows."""
         return self.settings.hop_s
-
-    @property
-    def learning(self) -> bool:
-        """True while a baseline is being learnt."""
-        return self._learner is not None
-
-    @property
-    def baseline_words(self) -> str:
-        """State of the baseline in words."""
-        if self._learner is not None:
-            done = 0.0 if self._began_ns is None else (self._t_ns - self._began_ns) / 1e9
-            return f"learning {done:.0f} of {self._learn_s:g} s"
-        if self.baseline is not None:
-            return f"learnt from {self.baseline.seconds:.0f} s"
-        return self._why_none or "none"
-
-    def learn(self, seconds: float = 0.0, *, extend: bool = False) -> None:
-        """Learn a baseline from now on, beside what is known or in its place; 0 s: as the settings say.
-
-        Raises
-        ------
-        InputError
-            When the time is not positive and finite.
-        """
-        wanted = seconds or self.settings.learn_s
-        if not (math.isfinite(wanted) and wanted > 0):
-            raise InputError("learn_baseline", "seconds", seconds, "a finite time above 0 s, or 0")
-        self._learn_s, self._extend = wanted, extend
-        self._learner = BaselineLearner(self.machine.name)
-        self._began_ns = None
-
-    def disturb(self, why: str) -> bool:
-        """Something speaks against the machine's being healthy: give up learning; True if it was going on."""
-        if self._learner is None:
-            return False
-        self._learner = None
-        self._why_none = f"none: learning was given up, {why}"
-        return True
 
     def push(self, features: Features) -> list[Report]:
         """Take the indicators of one channel over one window; return the report that follows."""
@@ -170,12 +127,12 @@ class TrendMonitor:
         step = speed_step(features.speed_hz)
         for key, value in _values(features):
             self._take(key, step, value, last_ns, features)
-        self._learn_on()
+        self.keeper.advance(self._t_ns)
         judged = self._judgeable(features)
         trends = self._trends_due()
         if not judged and trends is None:
             return []
-        standings = self._standings(features, step) if judged and self.baseline is not None else []
+        standings = self._standings(features, step) if judged else []
         known = bool(standings)
         return [
             Report(
@@ -187,9 +144,9 @@ class TrendMonitor:
                 features=(),
                 spectra=(),
                 indications=_indications(_scope(features), features, standings) if known else (),
-                tests=max(self.baseline.tests, 1) if self.baseline is not None else 1,
+                tests=self.keeper.tests,
                 judged=known,
-                note="" if known or not judged else self._why_not(features),
+                note="" if known or not judged else self.keeper.why_not(features.speed_hz),
                 quality=tuple[QualityIssue, ...](),
                 scope=_scope(features),
                 trends=trends,
@@ -203,10 +160,9 @@ class TrendMonitor:
 
     def trends(self) -> Trends:
         """All indicators as they stand now."""
-        if self.baseline is not None:
-            self._warn = Thresholds.derive(self.alarms, max(self.baseline.tests, 1), self.hop_s).warn
+        self._warn = Thresholds.derive(self.alarms, self.keeper.tests, self.hop_s).warn
         rows = tuple(self._row(key, series) for key, series in sorted(self._series.items()))
-        words = self.baseline_words
+        words = self.keeper.words
         return Trends(self._t_ns, self.machine.name, self.source, self._sample, words, rows)
 
     def _restart(self) -> None:
@@ -215,8 +171,7 @@ class TrendMonitor:
         self._latest.clear()
         self._series.clear()
         self._sent_ns = None
-        if self._learner is not None:
-            self.learn(self._learn_s, extend=self._extend)
+        self.keeper.restart()
 
     def _take(self, key: Key, step: int, value: float, t_ns: int, features: Features) -> None:
         series = self._series.get(key)
@@ -229,45 +184,19 @@ class TrendMonitor:
             series = self._series[key] = _Series(TrendHistory(block_s), unit)
         series.step = step
         series.history.add(t_ns * 1e-9, value)
-        if self._learner is not None:
-            if self._began_ns is None:
-                self._began_ns = t_ns
-            self._learner.add(key, step, value)
-
-    def _learn_on(self) -> None:
-        if self._learner is None or self._began_ns is None:
-            return
-        seconds = (self._t_ns - self._began_ns) / 1e9
-        if seconds < self._learn_s:
-            return
-        learner, self._learner = self._learner, None
-        try:
-            found = learner.finish(seconds)
-        except InputError as error:
-            self._why_none = f"none: {error}"
-            return
-        keep = self.baseline if self._extend else None
-        self.baseline = self.learnt = found if keep is None else keep.extended(found)
+        self.keeper.take(key, step, value, t_ns)
 
     def _judgeable(self, features: Features) -> bool:
         wanted = features.source in self.settings.sources
         return wanted and any(kind_of(value.name).judged for value in features.values)
 
     def _standings(self, features: Features, step: int) -> list[tuple[Key, float, Standing]]:
-        assert self.baseline is not None
         found = []
         for key, value in _values(features):
-            standing = self.baseline.standing(key, step, value) if kind_of(key[3]).judged else None
+            standing = self.keeper.standing(key, step, value) if kind_of(key[3]).judged else None
             if standing is not None:
                 found.append((key, value, standing))
         return found
-
-    def _why_not(self, features: Features) -> str:
-        if self.baseline is None:
-            return f"no baseline to judge by: {self.baseline_words}"
-        speeds = ", ".join(f"{speed:.3g}" for speed in self.baseline.speeds_hz())
-        at = f"{features.speed_hz:.3g} Hz" if math.isfinite(features.speed_hz) else "an unknown speed"
-        return f"no baseline at {at}: it was learnt near {speeds} Hz"
 
     def _trends_due(self) -> Trends | None:
         if self._sent_ns is not None and self._t_ns - self._sent_ns < self.settings.publish_s * 1e9:
@@ -277,10 +206,8 @@ class TrendMonitor:
 
     def _row(self, key: Key, series: _Series) -> TrendValue:
         now, slope = series.history.latest, series.history.slope()
-        standing, limit = None, math.nan
-        if self.baseline is not None:
-            standing = self.baseline.standing(key, series.step, now)
-            limit = self.baseline.limit(key, series.step, self._warn)
+        standing = self.keeper.standing(key, series.step, now)
+        limit = self.keeper.limit(key, series.step, self._warn)
         return TrendValue(
             source=key[0],
             channel=key[1],
