@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 from scipy.signal import butter, hilbert, sosfiltfilt
 
+from gearsim_bringup.bench import separation
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
@@ -26,7 +27,7 @@ LEVELS = 7
 
 
 def measure(_voice: Voice) -> Iterator[Figure]:
-    """Kurtogram, squared envelope spectrum, and the diagnosis of a record of one channel."""
+    """Kurtogram, squared envelope spectrum, separation, and the diagnosis of a record of one channel."""
     signal = _signal()
     single = signal.astype(np.float32)  # what records and streams hold
     try:
@@ -41,6 +42,7 @@ def measure(_voice: Voice) -> Iterator[Figure]:
         yield Figure("dsp.kurtogram_s", own, "s", Goal("<=", 0.5, on_ratio=True), ("PySDKit 0.5.0", peer))
     own, peer = alternate(lambda: _ses(signal), lambda: _plain_ses(signal))
     yield Figure("dsp.ses_s", own, "s", Goal("<=", 1, on_ratio=True), ("scipy band-pass + hilbert", peer))
+    yield from separation.figures(signal)
     machine = load_machine("unsw_parallel")
     record = Record(RATE_HZ, (machine.channels[0].name,), "m/s^2", single[None, :])
     whole = cpu_seconds(lambda: diagnose_record(record, machine), 2)

@@ -3,9 +3,9 @@
 The guards are those of `band_choice`: discrete lines (supply, inverter, gear mesh) taken out before anything
 is looked at, no band beyond the anti-alias filter's roll-off or without energy, and none that is no higher
 than chance. What chance does is found on surrogates: noise with the magnitudes of the same spectrum and
-random phases (Theiler et al., Physica D 58 (1992) 77-94), looked at by the same method. Lines of more than three
-times their neighbourhood's median magnitude are not limited, as for the kurtogram, but removed: autogram and
-protrugram ask for what repeats, and the rests of a family of lines do.
+random phases (Theiler et al., Physica D 58 (1992) 77-94), looked at by the same method. Lines of more than
+three times their neighbourhood's median magnitude are not limited, as for the kurtogram, but removed:
+autogram and protrugram ask for what repeats, and the rests of a family of lines do.
 """
 
 from __future__ import annotations
