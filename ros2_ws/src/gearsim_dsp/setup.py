@@ -36,6 +36,8 @@ setup(
         "console_scripts": [
             "envelope = gearsim_dsp.nodes.envelope:main",
             "kurtosis = gearsim_dsp.nodes.kurtosis:main",
+            "gear = gearsim_dsp.nodes.gear:main",
+            "trend = gearsim_dsp.nodes.trend:main",
         ]
     },
 )

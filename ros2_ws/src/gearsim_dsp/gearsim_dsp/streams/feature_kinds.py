@@ -59,13 +59,13 @@ KINDS: tuple[tuple[str, FeatureKind], ...] = (
     ("crest_factor", FeatureKind(ratio=True, least=6 * _DB)),
     # `decide` speaks of a weak modulation from 0.03 on; a quarter of what it takes to be a finding.
     ("*_modulation", FeatureKind(ratio=False, least=0.03)),
-    # Gear indicators (Lebold et al., MFPT 54 (2000) 623-634): FM4 is 3 for a sound gear.
+    # Gear indicators (Lebold et al., MFPT 54 (2000) 623-634): FM4 is 3 for a sound gear. FM0 is followed
+    # only: the shaft's own lines are in it, and these are judged by themselves.
     ("fm4", FeatureKind(ratio=False, least=1.5)),
     ("m6a", FeatureKind(ratio=True, least=6 * _DB)),
     ("m8a", FeatureKind(ratio=True, least=9 * _DB)),
     ("na4", FeatureKind(ratio=True, least=6 * _DB)),
     ("nb4", FeatureKind(ratio=True, least=6 * _DB)),
-    ("fm0", FeatureKind(ratio=True, least=6 * _DB)),
     ("energy_ratio", FeatureKind(ratio=True, least=6 * _DB)),
     ("sideband_level", FeatureKind(ratio=True, least=6 * _DB)),
     ("mesh_level", FeatureKind(ratio=True, least=6 * _DB)),
