@@ -4,4 +4,15 @@
 `docs/methods/<name>.md` that shows it.
 """
 
-FIGURES: tuple[str, ...] = ("squared_envelope_spectrum",)
+FIGURES: tuple[str, ...] = (
+    "autogram",
+    "cepstrum",
+    "deconvolution",
+    "discrete_random_separation",
+    "kurtogram",
+    "linear_prediction",
+    "protrugram",
+    "self_adaptive_noise_cancellation",
+    "spectral_kurtosis",
+    "squared_envelope_spectrum",
+)
