@@ -120,13 +120,16 @@ def test_each_shaft_has_its_average_while_the_speed_changes():
     assert 60 <= first.count <= 63
 
 
-def test_what_one_shaft_brings_is_taken_out_of_the_record():
+@pytest.mark.parametrize(("ratio", "samples_per_turn"), [(1.0, 128), (32 / 90, 180), (32 / 90, None)])
+def test_what_one_shaft_brings_is_taken_out_of_the_record(ratio, samples_per_turn):
+    """With as few as four samples to a wave."""
     fast, slow, phase = speeding_record()
-    average = shaft_average(fast, phase)
-    left = fast + slow - synchronous_part(average, phase, fast.size)
+    own, other = (fast, slow) if ratio == 1 else (slow, fast)
+    average = shaft_average(own, phase, ratio=ratio, samples_per_turn=samples_per_turn)
+    left = fast + slow - synchronous_part(average, phase, fast.size, ratio=ratio)
     inside = slice(200, -200)
     # Resampling there and back: the interpolators' own errors (1e-4 each) on an amplitude of 1.
-    assert rms((left - slow)[inside]) < 5e-4
+    assert rms((left - other)[inside]) < 5e-4
     with pytest.raises(InputError, match="synchronous_part"):
         synchronous_part(average, Phase(np.array([5.0, 900.0]), np.array([0.0, 1.0])), 900)
 

@@ -11,6 +11,7 @@ FIGURES: tuple[str, ...] = (
     "discrete_random_separation",
     "kurtogram",
     "linear_prediction",
+    "planet_separation",
     "protrugram",
     "self_adaptive_noise_cancellation",
     "spectral_kurtosis",

@@ -77,9 +77,7 @@ def demodulate_mesh(
     amplitude = np.asarray(sfft.ifft(np.roll(lines, -centre)) * 2.0)
     magnitude = np.abs(amplitude)
     mean = float(np.mean(magnitude))
-    phase = np.unwrap(
-        np.angle(np.append(amplitude, amplitude[0]) * np.exp(-1j * np.angle(np.sum(amplitude))))
-    )
+    phase = np.unwrap(np.angle(np.append(amplitude, amplitude[0])))
     tiny = 1e-9 * max(mean, np.finfo(np.float64).tiny)
     if not (float(magnitude.min()) > tiny and abs(phase[-1] - phase[0]) < math.pi):
         expected = f"harmonic {harmonic} of mesh order {mesh_order:g} stronger than its sidebands"

@@ -181,7 +181,7 @@ def pass_harmonics(
     return tuple(float(a) for a in series / series.max())
 
 
-def strike_levels(separation: Separation, teeth: int, sideband_count: int = 2) -> Floats:
+def strike_levels(separation: Separation, teeth: int, sideband_count: int = 1) -> Floats:
     """Fourth root of the mean fourth power of each difference signal: the planet struck hardest has the most.
 
     FM4 does not tell planets apart, as what leaks into the others' averages has the same shape.
