@@ -77,6 +77,24 @@ def test_the_wiener_filter_brings_impacts_out_of_noise():
     assert np.all(quiet.filtered(np.ones(500)) == 0)
 
 
+def test_the_filter_keeps_to_a_band():
+    rng = np.random.default_rng(8)
+    x = noise(rng, 100_000)
+    for place in (0.1, 0.4):
+        ring = np.exp(-np.arange(60) / 10) * np.cos(2 * np.pi * place * np.arange(60))
+        for k in range(0, x.size - 60, 1000):
+            x[k : k + 60] += 8 * ring
+    kurtosis = spectral_kurtosis(x, RATE, 128)
+    gain, inside = kurtosis.wiener_gain(), kurtosis.wiener_gain(band_hz=(0.0, 6000.0))
+    assert gain[kurtosis.frequency_hz > 6000.0].max() > 0.3
+    assert np.all(inside[kurtosis.frequency_hz > 6000.0] == 0)
+    assert inside.max() == 1.0
+    lines = np.abs(np.fft.rfft(kurtosis.filtered(x, band_hz=(0.0, 6000.0)) * np.hanning(x.size)))
+    assert lines[: lines.size // 2].max() > 100 * lines[int(0.6 * lines.size) :].max()
+    with pytest.raises(InputError, match="band_hz"):
+        kurtosis.wiener_gain(band_hz=(5000.0, 100.0))
+
+
 def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="at least 1024 samples"):
         spectral_kurtosis(np.ones(1000), RATE, 128)

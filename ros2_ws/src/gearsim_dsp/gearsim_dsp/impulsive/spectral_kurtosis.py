@@ -66,17 +66,30 @@ class SpectralKurtosis:
         tailed = 250.0 / k * (z**3 - 3 * z) / 24.0 - 100.0 / k * (2 * z**3 - 5 * z) / 36.0
         return float(2.0 / np.sqrt(k) * (z + skewed + tailed))
 
-    def wiener_gain(self, false_alarm: float = 1e-3) -> NDArray[np.float64]:
-        """sqrt(SK) where it exceeds `chance_limit`, else 0; shape (lines,), the largest scaled to 1."""
+    def wiener_gain(
+        self, false_alarm: float = 1e-3, band_hz: tuple[float, float] | None = None
+    ) -> NDArray[np.float64]:
+        """sqrt(SK) where it exceeds `chance_limit`, else 0; shape (lines,), the largest scaled to 1.
+
+        Outside `band_hz` it is 0: give the range below the anti-alias filter's roll-off
+        (`band_choice.usable_ceiling_hz`), whose slope is as impulsive as what leaks into it.
+        """
         gain = np.where(self.values > self.chance_limit(false_alarm), np.maximum(self.values, 0.0), 0.0)
+        if band_hz is not None:
+            low_hz, high_hz = band_hz
+            if not 0.0 <= low_hz < high_hz:
+                raise InputError("wiener_gain", "band_hz", band_hz, "0 <= low < high")
+            gain[(self.frequency_hz < low_hz) | (self.frequency_hz > high_hz)] = 0.0
         largest = float(gain.max(initial=0.0))
         return np.asarray(np.sqrt(gain / largest) if largest > 0 else gain)
 
-    def filtered(self, signal: ArrayLike, false_alarm: float = 1e-3) -> NDArray[np.float64]:
+    def filtered(
+        self, signal: ArrayLike, false_alarm: float = 1e-3, band_hz: tuple[float, float] | None = None
+    ) -> NDArray[np.float64]:
         """The signal through the filter of `wiener_gain`, without delay; zeros if nothing is impulsive."""
         taps = self.window_samples + 1
         x = checked_signal("SpectralKurtosis.filtered", signal, taps, "more than the window")
-        gain = np.concatenate(([0.0], self.wiener_gain(false_alarm), [0.0]))
+        gain = np.concatenate(([0.0], self.wiener_gain(false_alarm, band_hz), [0.0]))
         axis = np.linspace(0.0, 1.0, gain.size)
         return np.asarray(oaconvolve(x, firwin2(taps, axis, gain), mode="same"))
 
