@@ -6,6 +6,7 @@ weights say so.
 """
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,8 +16,15 @@ from gearsim_dsp.features import rms
 from gearsim_dsp.speed import Phase
 from gearsim_dsp.synchronous.indicators import fm4
 from gearsim_dsp.synchronous.pass_weights import McFaddenWindow, forrester_weights, gains
-from gearsim_dsp.synchronous.planets import pass_harmonics, separate, strike_levels, why_not_separable
+from gearsim_dsp.synchronous.planets import (
+    pass_harmonics,
+    pass_place,
+    separate,
+    strike_levels,
+    why_not_separable,
+)
 from gearsim_dsp.synchronous.signals import difference_signal
+from gearsim_dsp.synchronous.tsa import shaft_average
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine
 from gearsim_sim.engine import Engine
@@ -130,8 +138,37 @@ def test_loudness_is_measured_from_what_differs_between_planets():
     found = pass_harmonics(x + np.random.default_rng(1).normal(size=x.size), phase, RIG, STAGE)
     # The planets' shapes are independent: 3 x 60 lines give the powers to some 15 %, the amplitudes to 8.
     assert found == pytest.approx((0.5, 1.0, 0.4, 0.0), abs=0.12)
-    with pytest.raises(InputError, match="planets that differ"):
-        pass_harmonics(np.zeros(x.size), phase, RIG, STAGE)
+    for silent in (np.zeros(x.size), np.random.default_rng(2).normal(size=x.size)):
+        with pytest.raises(InputError, match="planets that differ"):
+            pass_harmonics(silent, phase, RIG, STAGE)
+
+
+@pytest.mark.parametrize("machine", ["unsw_planetary", "unsw_planetary_hunting"])
+@pytest.mark.parametrize("place", [0.05, 0.3])
+def test_where_planets_pass_is_in_the_sidebands_of_the_mesh(machine, place):
+    """Planets that mesh alike, loudest as they pass; each in its own phase of the mesh."""
+    plate = load_machine(machine)
+    stage = plate.planetary_stages[0]
+    u, phase = carrier(8)
+    rng = np.random.default_rng(3)
+    mesh = [complex(*rng.normal(size=2)) for _ in range(4)]
+    x = rng.normal(size=u.size)
+    for planet in PLACES:
+        waves = (
+            c * np.exp(2j * np.pi * (h + 1) * stage.ring_teeth * (u + planet)) for h, c in enumerate(mesh)
+        )
+        x += cosines((1.0, 1.3, 0.6, 0.2), u - place + planet) * np.real(sum(waves))
+    found = pass_place(shaft_average(x, phase), stage)
+    assert found.turn == pytest.approx(place % (1 / 3), abs=0.01)
+    # Harmonics 1, 2, 4 have the lines 0.65 and 0.3 and nothing beyond: 0.65 x 0.3 / (0.65^2 + 0.3^2) = 0.38;
+    # harmonic 3 has 0.1, 1, 0.1: (0.1 + 0.1) / (1 + 0.1^2 + 0.1^2) = 0.2.
+    assert 0.2 < found.coherence < 0.4
+    assert pass_place(shaft_average(rng.normal(size=u.size), phase), stage).coherence < 0.25
+    with pytest.raises(InputError, match="one turn, with the mesh"):
+        pass_place(shaft_average(x, phase, samples_per_turn=100), stage)
+    uneven = replace(stage, planet_angles_rad=(0.0, 1.0, 3.0))
+    with pytest.raises(InputError, match="evenly spaced"):
+        pass_place(shaft_average(x, phase), uneven)
 
 
 def test_the_sun_is_united_over_its_planets():
@@ -204,6 +241,11 @@ def test_the_planet_with_the_bad_tooth_is_found(case, planet):
     assert int(np.argmax(levels)) == planet - 1
     # What the others hold of it is half as much, as `gains` says, and their own small differences.
     assert sorted(levels)[1] < 0.75 * max(levels)
+
+
+def test_a_rigid_ring_does_not_tell_where_planets_pass():
+    x, phase = simulated("healthy", 2, 2)
+    assert pass_place(shaft_average(x, phase), STAGE).coherence < 0.1
 
 
 def test_the_average_of_one_planet_shows_the_tooth_and_a_sound_stage_shows_none():

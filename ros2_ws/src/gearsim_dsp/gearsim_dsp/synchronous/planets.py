@@ -36,13 +36,24 @@ from gearsim_dsp.synchronous.tsa import Average
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine, PlanetaryStage
 
-__all__ = ["Separation", "pass_harmonics", "separate", "strike_levels", "why_not_separable"]
+__all__ = [
+    "PassPlace",
+    "Separation",
+    "pass_harmonics",
+    "pass_place",
+    "separate",
+    "strike_levels",
+    "why_not_separable",
+]
 
 Floats = NDArray[np.float64]
 Member = Literal["planet", "sun"]
 
 _SCATTER_HARMONICS = 8
 """Harmonics of the carrier in what repeats, when the rest is measured; passing of planets is smoother."""
+
+_CLEAR = 6.0
+"""A harmonic of the loudness stands this many standard deviations over those of the noise, told by a few."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +90,24 @@ class Separation:
         spread = [_turned(a.std**2, place) for a, place in zip(self.averages, places, strict=True)]
         std = np.sqrt(np.maximum(np.mean(spread, axis=0), 0.0) / len(values))
         return Average(np.mean(values, axis=0), std, self.averages[0].count)
+
+
+@dataclass(frozen=True, slots=True)
+class PassPlace:
+    """Where planets pass a sensor.
+
+    Parameters
+    ----------
+    turn : float
+        Turn of the carrier at which one of the planets is loudest, from 0 to below one over their number;
+        as `pass_turn` of `separate` it makes that one planet 1.
+    coherence : float
+        Part of the sidebands' power that agrees on it, 0 to 1: low too where one line of a pair has all the
+        power, which noise then decides. Of noise on n pairs it is about 1 / sqrt(n).
+    """
+
+    turn: float
+    coherence: float
 
 
 def why_not_separable(stage: PlanetaryStage, member: Member = "planet") -> str | None:
@@ -172,13 +201,55 @@ def pass_harmonics(
         power = np.abs(lines[0]) ** 2 + np.abs(lines[1]) ** 2
         power[:: stage.planet_teeth] = 0.0
         powers.append(float(np.sum(power)))
-    floor = float(np.median(powers[count + 1 :]))
+    beyond = np.asarray(powers[count + 1 :])
+    floor, scatter = float(np.mean(beyond)), float(np.std(beyond, ddof=1))
     # The cosine and sine parts of m > 0 are a quarter of a_m^2 together, that of m = 0 is all of a_0^2.
-    series = np.sqrt(np.maximum(np.asarray(powers[: count + 1]) - floor, 0.0))
+    excess = np.asarray(powers[: count + 1]) - floor
+    series = np.sqrt(np.where(excess > _CLEAR * scatter, excess, 0.0))
     series[1:] *= 2.0
     if not series.max() > 0:
         raise InputError("pass_harmonics", "signal", "no lines of single planets", "planets that differ")
     return tuple(float(a) for a in series / series.max())
+
+
+def pass_place(average: Average, stage: PlanetaryStage, *, reach: int = 6) -> PassPlace:
+    """Where planets pass the sensor, from the carrier's average: the place of one, not which.
+
+    Parameters
+    ----------
+    average : Average
+        Of the planet carrier (`tsa.shaft_average`), from a sensor beside the ring.
+    stage : PlanetaryStage
+        With planets evenly spaced and a ring that stands; it need not be a hunting design.
+    reach : int
+        Sidebands of the mesh harmonics looked at, in carrier orders.
+
+    Notes
+    -----
+    Of N like planets the mesh harmonic h leaves the lines h Z_r + m that are multiples of N, with the
+    amplitudes N a_m C_h exp(-2 pi j m u_1) (McFadden and Smith, Proc. Inst. Mech. Eng. C 199 (1985) 65-70).
+    Two of them N apart differ by 2 pi N u_1 in phase if a_m > 0, that is, if planets are loudest as they
+    pass: u_1 modulo 1/N. A ring that hears them by direction alone has one such line only: the coherence
+    is then near 0. (Another way: D'Elia, Mucchi and Dalpiaz, Int. Conf. Surveillance 7 (2013).)
+    """
+    places = np.asarray(stage.planet_angles_rad) / (2 * math.pi)
+    count = places.size
+    even = np.allclose(np.sort(np.mod(places - places[0], 1.0)), np.arange(count) / count, atol=1e-3)
+    if count < 2 or not even or stage.fixed_member != "ring":
+        got = f"{count} planets, the {stage.fixed_member} stands"
+        raise InputError("pass_place", "stage", got, "two or more, evenly spaced, on a ring that stands")
+    if average.turns_per_period != 1 or average.samples_per_turn <= 2 * (stage.ring_teeth + reach):
+        got = f"{average.samples_per_turn} samples in each of {average.turns_per_period} turns"
+        raise InputError("pass_place", "average", got, "one turn, with the mesh and its sidebands")
+    lines = sfft.rfft(average.values)
+    total, most = 0j, 0.0
+    for harmonic in range(stage.ring_teeth, lines.size - reach, stage.ring_teeth):
+        near = [k for k in range(harmonic - reach, harmonic + reach + 1) if k % count == 0]
+        low, high = lines[near[:-1]], lines[near[1:]]
+        total += complex(np.sum(high * np.conj(low)))
+        most += 0.5 * float(np.sum(np.abs(high) ** 2 + np.abs(low) ** 2))
+    turn = float(np.mod(-np.angle(total) / (2 * math.pi * count), 1 / count))
+    return PassPlace(turn, abs(total) / most if most > 0 else 0.0)
 
 
 def strike_levels(separation: Separation, teeth: int, sideband_count: int = 1) -> Floats:
