@@ -11,7 +11,7 @@ Rolling without slip between rings that turn at f_i (inner) and f_o (outer), wit
 (Harris, Rolling Bearing Analysis, ch. 8; Randall and Antoni, Mech. Syst. Signal Process. 25 (2011)
 485-520, eq. 1-4.) A defect is modulated by what carries it through the load zone: a defect on a ring that
 turns by that ring's speed, a defect on an element by the cage, and an element strikes both races, so it
-speaks at 2 BSF.
+speaks at 2 BSF. Wheels and planets: `gear_kinematics`, `planet_kinematics`.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 from scipy.signal import butter, hilbert, sosfiltfilt
 
-from gearsim_bringup.bench import separation
+from gearsim_bringup.bench import separation, synchronous
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
@@ -43,6 +43,7 @@ def measure(_voice: Voice) -> Iterator[Figure]:
     own, peer = alternate(lambda: _ses(signal), lambda: _plain_ses(signal))
     yield Figure("dsp.ses_s", own, "s", Goal("<=", 1, on_ratio=True), ("scipy band-pass + hilbert", peer))
     yield from separation.figures(signal)
+    yield from synchronous.figures(signal, RATE_HZ)
     machine = load_machine("unsw_parallel")
     record = Record(RATE_HZ, (machine.channels[0].name,), "m/s^2", single[None, :])
     whole = cpu_seconds(lambda: diagnose_record(record, machine), 2)
