@@ -21,7 +21,7 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
-    package_data={NAME: ["bench/peers/*.txt"]},
+    package_data={NAME: ["bench/peers/*.txt", "monitoring/files/*.*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -38,6 +38,8 @@ setup(
         "psutil>=5.9",
         "matplotlib>=3.8",
         "pydantic>=2",
+        "prometheus-client>=0.20",
+        "paho-mqtt>=2.1",
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",
@@ -48,6 +50,8 @@ setup(
     entry_points={
         "console_scripts": [
             "gearsim = gearsim_bringup.cli:main",
+            "exporter = gearsim_bringup.monitoring.nodes.exporter:main",
+            "mqtt = gearsim_bringup.monitoring.nodes.mqtt:main",
         ]
     },
 )

@@ -35,6 +35,7 @@ COMMANDS = {
     "info": "info",
     "diagnose": "diagnose",
     "view": "view",
+    "monitoring": "monitoring",
     "bench": "bench",
     "gallery": "gallery",
     "figures": "figures",

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gearsim_bringup.monitoring.choice import MONITORS, Choice
 from gearsim_bringup.processes import Graph, NodeProcess, NodeSpec
 from gearsim_bringup.ui import JobFailedError
 from gearsim_io import qos
 from gearsim_io.errors import InputError
 
-MONITORS = ("envelope", "kurtosis")
+__all__ = ["MONITORS", "BadNodeError", "Choice", "LiveRun", "Outcome", "player", "simulator"]
+
 _READY_S = 60.0
 # In which another rig in this domain makes itself known, as a rule. At times the middleware's first greetings
 # are lost and the next come after 3 s: so the run keeps looking.
@@ -40,6 +42,8 @@ class LiveRun:
         Shows the run as a rerun recording.
     on_alarm, on_truth : callable, optional
         Called with each message as it arrives.
+    choice : Choice
+        Which diagnostic nodes run, and who passes their results on.
     """
 
     source: NodeSpec
@@ -49,6 +53,7 @@ class LiveRun:
     rrd: Path | None = None
     on_alarm: Callable[[Any], None] | None = None
     on_truth: Callable[[Any], None] | None = None
+    choice: Choice = field(default_factory=Choice)
 
     def sinks(self) -> list[NodeSpec]:
         """Everything that listens, in the order in which it starts."""
@@ -58,7 +63,7 @@ class LiveRun:
             specs.append(NodeSpec("recorder", "gearsim_io.nodes.recorder", values))
         if self.rrd is not None:
             specs.append(NodeSpec("viewer", "gearsim_io.nodes.viewer", {"out": str(self.rrd)}))
-        return specs + [NodeSpec(name, f"gearsim_dsp.nodes.{name}") for name in MONITORS]
+        return [*specs, *self.choice.specs()]
 
     def run(self, on_start: Callable[[Graph], None] | None = None) -> Outcome:
         """Run until the source ends by itself, or Ctrl-C. `on_start` is told when all processes are up.

@@ -6,12 +6,15 @@ from pathlib import Path
 
 import click
 
+from gearsim_bringup.monitoring.choice import Choice
+from gearsim_bringup.monitoring.options import choose, monitor_options
 from gearsim_bringup.options import ANY_PATH, FiniteRange, example
 from gearsim_bringup.processes import NodeSpec
 
 EXAMPLE = """
 ./gearsim play out/my_bag
 ./gearsim play out/my_bag --rate 4 --diagnose
+./gearsim play out/my_bag --diagnose --monitors all --prometheus 9812
 """
 
 
@@ -20,23 +23,35 @@ EXAMPLE = """
 @click.option("--rate", default=1.0, type=FiniteRange(0.01, 100), help="Times the recorded pace.")
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
 @click.option("--diagnose", is_flag=True, help="Start the diagnostic nodes too and print their alarms.")
-def command(bag: Path, rate: float, loop: bool, diagnose: bool) -> int:
+@monitor_options
+def command(
+    bag: Path,
+    rate: float,
+    loop: bool,
+    diagnose: bool,
+    monitors: str,
+    latch: str,
+    prometheus: str | None,
+    mqtt: str | None,
+) -> int:
     """Play a BAG on the topics it was recorded from, with /clock.
 
     With --diagnose the bag's own features, spectra and alarms are left out: the nodes make new ones.
     """
-    from gearsim_bringup.live import MONITORS, player
+    from gearsim_bringup.live import player
 
+    chosen = choose(monitors, latch, prometheus, mqtt)
     if not diagnose:
         from gearsim_io.nodes.player import main
 
         spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)
         return int(main(["gearsim", *spec.arguments()]))
-    _judge(bag, player(bag, rate=rate, loop=loop, listeners=len(MONITORS), signals_only=True))
+    source = player(bag, rate=rate, loop=loop, listeners=chosen.listeners, signals_only=True)
+    _judge(bag, source, chosen)
     return 0
 
 
-def _judge(bag: Path, source: NodeSpec) -> None:
+def _judge(bag: Path, source: NodeSpec, choice: Choice) -> None:
     import tempfile
 
     from gearsim_bringup.live import LiveRun
@@ -52,4 +67,5 @@ def _judge(bag: Path, source: NodeSpec) -> None:
         raise InputError(str(bag), qos.ACCEL.full_name, "nothing", "samples to diagnose")
     teller = Teller(Voice(json_mode=False), place.sample_rate_hz)
     with tempfile.TemporaryDirectory(prefix="gearsim_play_") as logs:
-        LiveRun(source, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth).run()
+        run = LiveRun(source, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth, choice=choice)
+        run.run()

@@ -9,12 +9,14 @@ from typing import Any
 import click
 
 from gearsim_bringup.first_use import tell_first_use
+from gearsim_bringup.monitoring.options import choose, monitor_options
 from gearsim_bringup.options import ANY_PATH, POSITIVE, FiniteRange, example
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
 ./gearsim run healthy
 ./gearsim run demo --seconds 30 --record out/my_bag --view out/my_run.rrd
+./gearsim run gear_wear --monitors all --latch error --prometheus 9812 --mqtt 127.0.0.1
 """
 
 
@@ -26,8 +28,17 @@ EXAMPLE = """
 @click.option("--rate", type=FiniteRange(0, 1000), help="Times real time; 0 is as fast as it goes.")
 @click.option("--record", "bag", type=ANY_PATH, help="Record to this new bag.")
 @click.option("--view", "rrd", type=ANY_PATH, help="Write a rerun recording of the run.")
+@monitor_options
 def command(
-    scenario: str, seconds: float | None, rate: float | None, bag: Path | None, rrd: Path | None
+    scenario: str,
+    seconds: float | None,
+    rate: float | None,
+    bag: Path | None,
+    rrd: Path | None,
+    monitors: str,
+    latch: str,
+    prometheus: str | None,
+    mqtt: str | None,
 ) -> None:
     """Run simulator and diagnostic nodes live on a SCENARIO (a shipped name, or a YAML file).
 
@@ -42,11 +53,12 @@ def command(
         if path is not None:
             refuse_existing(path, f"the name of a new {what}")
     loaded = load_scenario(scenario)
-    from gearsim_bringup.live import MONITORS, LiveRun, simulator  # after what can be refused at once
+    from gearsim_bringup.live import LiveRun, simulator  # after what can be refused at once
 
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)
-    listeners = len(MONITORS) + (bag is not None) + (rrd is not None)
+    chosen = choose(monitors, latch, prometheus, mqtt)
+    listeners = chosen.listeners + (bag is not None) + (rrd is not None)
     source = simulator(str(Path(loaded.source)), end_after=seconds or 0.0, rate=rate, listeners=listeners)
     custom: dict[str, Any] = {"scenario": loaded.name, "seed": str(loaded.seed)}
     with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
@@ -54,7 +66,7 @@ def command(
         tell_first_use(voice)
         voice.say("topics under /gearsim; Ctrl-C ends the run")
         try:
-            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth).run()
+            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth, chosen).run()
         finally:  # also after Ctrl-C, the usual end
             for path in (bag, rrd):
                 if path is not None and path.exists():

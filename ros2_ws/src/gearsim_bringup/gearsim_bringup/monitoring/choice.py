@@ -1,0 +1,76 @@
+"""Which diagnostic nodes a live graph has, and who passes their results on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gearsim_bringup.processes import NodeSpec
+from gearsim_io.errors import InputError
+
+__all__ = ["ALL_MONITORS", "MONITORS", "Choice", "choose"]
+
+MONITORS = ("envelope", "kurtosis")
+"""Nodes that run unless others are asked for: they judge by themselves, without a learnt baseline."""
+
+ALL_MONITORS = (*MONITORS, "gear", "trend")
+_OF_RESULTS = ("trend",)
+EXPORTER_PORT, MQTT_PORT = 9812, 1883
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Diagnostic nodes of `ALL_MONITORS`, which of their levels latch, and addresses of the stacks.
+
+    `prometheus` is where the exporter listens, `mqtt` where the broker is: (host, port).
+    """
+
+    monitors: tuple[str, ...] = MONITORS
+    latch: str = "none"
+    prometheus: tuple[str, int] | None = None
+    mqtt: tuple[str, int] | None = None
+
+    @property
+    def listeners(self) -> int:
+        """Nodes that subscribe to the samples."""
+        return sum(name not in _OF_RESULTS for name in self.monitors)
+
+    def specs(self) -> list[NodeSpec]:
+        """The nodes, those that listen to results before those that have them."""
+        found = []
+        for name, address in (("exporter", self.prometheus), ("mqtt", self.mqtt)):
+            if address is not None:
+                values: dict[str, str | int] = {"host": address[0], "port": address[1]}
+                found.append(NodeSpec(name, f"gearsim_bringup.monitoring.nodes.{name}", values))
+        order = sorted(self.monitors, key=lambda name: name not in _OF_RESULTS)
+        parameters = {"latch": self.latch}
+        return found + [NodeSpec(name, f"gearsim_dsp.nodes.{name}", parameters) for name in order]
+
+
+def choose(monitors: str, latch: str, prometheus: str | None, mqtt: str | None) -> Choice:
+    """What was asked for on the command line.
+
+    Raises
+    ------
+    InputError
+        For a node that there is not, or an address that is none.
+    """
+    names = ALL_MONITORS if monitors == "all" else tuple(dict.fromkeys(monitors.replace(" ", "").split(",")))
+    for name in names:
+        if name not in ALL_MONITORS:
+            raise InputError("--monitors", "", name, f"all, or some of {', '.join(ALL_MONITORS)}")
+    return Choice(
+        names,
+        latch,
+        None if prometheus is None else _address(prometheus, "--prometheus", EXPORTER_PORT),
+        None if mqtt is None else _address(mqtt, "--mqtt", MQTT_PORT),
+    )
+
+
+def _address(text: str, where: str, usual: int) -> tuple[str, int]:
+    """`9812`, `host` or `host:9812`; without a host this computer alone."""
+    host, _, port = (
+        text.rpartition(":") if ":" in text else ("", "", text) if text.isdigit() else (text, "", "")
+    )
+    if (port or ":" in text) and not (port.isdigit() and int(port) < 65536):
+        raise InputError(where, "", text, "a port, a host, or host:port")
+    return host or "127.0.0.1", int(port) if port else usual

@@ -1,0 +1,1 @@
+"""Nodes that pass features, trends and alarms on to monitoring stacks."""
