@@ -13,7 +13,7 @@ from gearsim_sim.lane_pack import aligned
 from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, LAG, NOW_COLUMNS, SPIN_LAG
 from gearsim_sim.model.lane_data import LaneDrive, LaneElements, LaneMemory, LaneWork
 from gearsim_sim.model.loop_data import COLUMNS, SEVERITY_COLUMNS, Data, Drive, Meshes
-from gearsim_sim.model.mesh_loop import WORK_COLUMNS
+from gearsim_sim.model.mesh_loop import WORK_ROWS
 from gearsim_sim.model.plant import Plant
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def make_work(elements: LaneElements, drive: LaneDrive, inputs: int, interfaces:
         touched=np.zeros((spalls, 2), dtype=np.int64),
         now=np.zeros((LANES, bearings, NOW_COLUMNS)),
         jumps=np.zeros((spalls, JUMP_COLUMNS)),
-        lane_meshes=np.zeros((meshes, WORK_COLUMNS)),
+        lane_meshes=np.zeros((WORK_ROWS, meshes)),
     )
 
 

@@ -18,6 +18,7 @@ from gearsim_sim.integrate.pieces import circle_table
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop, make_work
 from gearsim_sim.model.loop_data import Data, Drive, Part
+from gearsim_sim.model.mesh_nodes import node_order, node_stride
 from gearsim_sim.model.plant import Moment, Plant, RotatingSite, StateRow
 from gearsim_sim.model.plant_data import bearing_data, bearing_memory, mesh_data
 from gearsim_sim.model.side_data import Side, SidePart
@@ -110,6 +111,7 @@ class Stepper:
         kinds = ((False, False), (True, False), (True, True))
         self._loops = [make_loop(*sizes, shape[1], rates, side) for rates, side in kinds]
         self._side = SideState(plant, [_side_part(part) for part in parts], len(vectors), schedule.step_s)
+        self._node_order = node_order(plant)
         self._memory = bearing_memory(self._data.bearings)
         self.row_count = len(vectors)
         self._state = self._at_rest()
@@ -153,7 +155,7 @@ class Stepper:
                 continue
             own = rest.x[setup.dofs]
             z = setup.propagator.modal(own, np.zeros_like(own))
-            known = rest.inputs @ setup.propagator.left_known
+            known = rest.inputs @ setup.part.left_known
             states.append(pack_state(setup.propagator, z, known, rest.forces[setup.interfaces]))
         return states[0], states[1]
 
@@ -192,10 +194,12 @@ class Stepper:
         """Let a variant of the loop move `state`; returns its rows at the output samples."""
         width = MOTION_COLUMNS + len(self._rows) + self._place.size
         motion = np.empty((count // self.oversampling + 1, width))
+        stride = 1 if side.active else node_stride(self._node_order, self._schedule.segment)
         work = make_work(self._data, drive, self._place.size)
         samples = loop(
-            *state, self._data, drive, side, self._memory, work, self.step, count, accel, column, motion
-        )
+            *state, self._data, drive, side, self._memory, work, self.step, count, stride, accel, column,
+            motion,
+        )  # fmt: skip
         return motion[:samples]
 
     def _unpack(self, columns: Array) -> Motion:
@@ -295,7 +299,7 @@ def set_up_part(
         part=Part(
             k=pack_constants(propagator),
             length=2 * propagator.modes,
-            left_known=propagator.left_known,
+            left_known=propagator.within(propagator.left_known),
             site_known=np.ascontiguousarray(propagator.site_known),
             site_index=felt.astype(np.int64),
             state_rows=propagator.output_rows(

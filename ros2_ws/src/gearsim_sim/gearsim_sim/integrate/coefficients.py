@@ -74,6 +74,19 @@ class Propagator:
         """Rows of the output product: interface motions, then sites."""
         return self.motions + self.sites
 
+    @property
+    def ratios(self) -> NDArray[np.float64]:
+        """c_1 to c_3 over c_0, flat (3 * 2 modes,); zero where modes are filled up."""
+        first, *others = (one[: self.modes] + 1j * one[self.modes :] for one in self.weights.reshape(4, -1))
+        safe = np.where(first == 0, 1.0, first)
+        return _flat_complex(np.array(others) / safe, self.modes).ravel()
+
+    def within(self, modal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What modal forces (rows, 2 modes) at the new instant add to the mode coordinates in the step."""
+        half = self.modes
+        first = self.weights[:half] + 1j * self.weights[half : 2 * half]
+        return _flat_complex((modal[:, :half] + 1j * modal[:, half:]) * first, half)
+
     def output_rows(self, shapes: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Rows (k, 2 modes) that give Re(shapes z) from flat mode coordinates; shapes is (k, m)."""
         return flat_rows(shapes, self.modes)

@@ -40,7 +40,7 @@ def table_value(turns: float, tables: Array, offset: int, points: int) -> tuple[
 
     The table, as `PeriodicSeries.table` makes it for `points` intervals, begins at `offset` of `tables`.
     """
-    scaled = (turns - math.floor(turns)) * points
+    scaled = (turns - np.floor(turns)) * points
     i = min(int(scaled), points - 1)
     t = scaled - i
     at = offset + 2 * i

@@ -94,8 +94,9 @@ def places(side: Side, s: Array, start: int, n2: int) -> None:
         place = 0.0
         rate = 0.0
         for m in range(n2):
-            place += side.rows[d, start + m] * s[n2 + m]
-            rate += side.rate_rows[d, start + m] * s[n2 + m]
+            predicted = s[n2 + m] + s[2 * n2 + m]
+            place += side.rows[d, start + m] * predicted
+            rate += side.rate_rows[d, start + m] * predicted
         side.now[PLACE, d] += place
         side.now[RATE, d] += rate
 
@@ -189,9 +190,9 @@ def joint_forces(
         if force != 0.0:
             for m in range(n0):
                 s0[m] += side.step[d, m] * force
-                s0[3 * n0 + m] += side.left[d, m] * force
+                s0[3 * n0 + m] += side.step[d, m] * force
             for m in range(n1):
                 s1[m] += side.step[d, n0 + m] * force
-                s1[3 * n1 + m] += side.left[d, n0 + m] * force
+                s1[3 * n1 + m] += side.step[d, n0 + m] * force
         for i in range(accel.shape[0]):
             accel[i, column] += side.site_full[d, i] * force + side.site_known[d, i] * now[KNOWN, d]

@@ -74,9 +74,9 @@ def known_forces(
         force = now[KNOWN, d]
         torque += side.rigid[d] * force
         for m in range(n0):
-            s0[2 * n0 + m] += side.left[d, m] * force
+            s0[2 * n0 + m] += side.step[d, m] * force
         for m in range(n1):
-            s1[2 * n1 + m] += side.left[d, n0 + m] * force
+            s1[2 * n1 + m] += side.step[d, n0 + m] * force
     follow(side, torque / data.inertia, data.step_s)
 
 

@@ -100,7 +100,7 @@ class LaneWork(NamedTuple):
     touched: Indices  # (spalls, 2)
     now: Array  # (LANES, bearings, NOW_COLUMNS)
     jumps: Array  # (spalls, JUMP_COLUMNS)
-    lane_meshes: Array  # (meshes, WORK_COLUMNS)
+    lane_meshes: Array  # (WORK_ROWS, meshes)
 
 
 class LaneMemory(NamedTuple):

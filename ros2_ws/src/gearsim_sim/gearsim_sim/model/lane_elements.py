@@ -15,7 +15,7 @@ from gearsim_sim.model.bearing_fault_loop import place_spalls, rest_terms
 from gearsim_sim.model.bearing_loop import bearing_forces
 from gearsim_sim.model.lane_data import Array, LaneDrive, LaneElements, LaneMemory, LaneRows, LaneWork
 from gearsim_sim.model.loop_data import BearingMemory, Bearings, Meshes
-from gearsim_sim.model.mesh_loop import mesh_forces
+from gearsim_sim.model.mesh_loop import look_up, mesh_forces
 
 
 @inlined
@@ -196,6 +196,7 @@ def ill_mesh_forces(
             elements.lane_index[lane], elements.lane_numbers[lane], elements.lane_errors[lane],
             elements.tables, elements.step_s,
         )  # fmt: skip
+        look_up(work.lane_phases, work.speeds[0, lane], rows, meshes, work.lane_meshes)
         mesh_forces(
             step, work.lane_motion, work.lane_motion_rates, work.lane_phases, work.speeds[0, lane], rows,
             meshes, work.lane_meshes, work.lane_forces,

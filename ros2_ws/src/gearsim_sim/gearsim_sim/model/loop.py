@@ -6,7 +6,6 @@ long runs; every quantity is a function of the integer step index, never of the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
@@ -14,7 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from gearsim_sim.integrate.compiled import compiled, inlined
-from gearsim_sim.integrate.kernel import correct, interface_motion, predict, site_accelerations, state_row
+from gearsim_sim.integrate.kernel import (
+    advance,
+    correct,
+    enter_known,
+    interface_motion,
+    predict,
+    remember_forces,
+    site_accelerations,
+    state_row,
+)
 from gearsim_sim.integrate.pieces import cosine_sine
 from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, NOW_COLUMNS, rest_terms
 from gearsim_sim.model.bearing_loop import bearing_forces
@@ -22,7 +30,8 @@ from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_
 from gearsim_sim.model.joint_loop import guess_forces, joint_forces
 from gearsim_sim.model.known_loop import ANGLE, SPEED, known_forces
 from gearsim_sim.model.loop_data import Array, BearingMemory, Data, Drive, Part
-from gearsim_sim.model.mesh_loop import WORK_COLUMNS, mesh_forces
+from gearsim_sim.model.mesh_loop import WORK_ROWS, look_up, mesh_forces
+from gearsim_sim.model.mesh_nodes import NODE_ROWS, between_nodes, next_node
 from gearsim_sim.model.side_data import Side
 
 # Columns of `motion` before the state rows of both parts: turns since the anchor, speed.
@@ -41,7 +50,8 @@ class Work(NamedTuple):
     phases: Array  # (tracks,)
     now: Array  # (bearings, NOW_COLUMNS)
     jumps: Array  # (spalls, JUMP_COLUMNS)
-    meshes: Array  # (meshes, WORK_COLUMNS)
+    meshes: Array  # (WORK_ROWS, meshes)
+    nodes: Array  # (NODE_ROWS, meshes)
 
 
 def make_work(data: Data, drive: Drive, interfaces: int) -> Work:
@@ -56,16 +66,17 @@ def make_work(data: Data, drive: Drive, interfaces: int) -> Work:
         phases=np.zeros(drive.rates.size),
         now=np.zeros((data.bearings.places.shape[0], NOW_COLUMNS)),
         jumps=np.zeros((drive.spalls.shape[0], JUMP_COLUMNS)),
-        meshes=np.zeros((data.meshes.places.shape[0], WORK_COLUMNS)),
+        meshes=np.zeros((WORK_ROWS, data.meshes.places.shape[0])),
+        nodes=np.zeros((NODE_ROWS, data.meshes.places.shape[0])),
     )
 
 
 @inlined
 def move_phases(drive: Drive, passed: float, phases: Array) -> None:
     """Angles of all tracks in turns, within [0, 1)."""
-    for j in range(phases.size):
+    for j in range(phases.size & 0xFFFF):
         turns = drive.anchor_phases[j] + drive.rates[j] * passed
-        phases[j] = turns - math.floor(turns)
+        phases[j] = turns - np.floor(turns)  # math.floor makes an integer, which fills no vector registers
 
 
 @inlined
@@ -110,17 +121,20 @@ def make_loop(
 
     def run(
         s0: Array, s1: Array, data: Data, drive: Drive, side: Side, memory: BearingMemory,
-        work: Work, first: int, count: int,
-        accel: Array, column: int, motion: Array,
+        work: Work, first: int, count: int, stride: int, accel: Array, column: int, motion: Array,
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
+
+        Mesh functions are looked up every `stride` steps, see `mesh_nodes`; with forces beside the machine's
+        own elements, which may turn its shafts, at every step.
 
         accel (site rows, columns) gets `count` columns from `column` on. `motion` (samples,
         MOTION_COLUMNS + state rows of both parts + interfaces) gets a row at each output sample.
         """
         q, rates, forces, phases = work.q, work.rates, work.forces, work.phases
         known0, known1, inputs = work.known0, work.known1, work.inputs
-        now, jumps, meshes = work.now, work.jumps, work.meshes
+        now, jumps, meshes, nodes = work.now, work.jumps, work.meshes, work.nodes
+        sites0, sites1 = known0.size, known1.size
         rest_terms(memory, now)
         per_step = 1.0 / drive.length_steps
         per_second = per_step / data.step_s
@@ -128,63 +142,87 @@ def make_loop(
         # The known inputs are worked out at each step, or at the first one only if they stay as they are.
         changing = first + 1 if drive.steady == 1 else first + count
         samples = 0
-        for i in range(count):
-            step = first + i + 1
-            turns, speed, change = reference_motion(step, drive, per_step, per_second)
-            passed = turns - anchor
-            for _ in range(sided):
-                passed += side.drift[ANGLE]
-                speed += side.drift[SPEED]
-            move_phases(drive, passed, phases)
-            if step <= changing:
-                known_inputs(step, change, drive, data, inputs)
-                apply_known(inputs, data.first, s0, known0, n0)
-                apply_known(inputs, data.second, s1, known1, n1)
-            for _ in range(sided):
+        before = first // stride * stride - stride
+        while before < first + count:
+            behind = before + stride
+            for _ in range(1 - sided):
+                turns, speed, _ = reference_motion(behind, drive, per_step, per_second)
+                move_phases(drive, turns - anchor, phases)
+                next_node(phases, speed * data.step_s, drive, data.meshes, nodes)
+            for step in range(max(first, before) + 1, min(first + count, behind) + 1):
+                i = step - first - 1
+                turns, speed, change = reference_motion(step, drive, per_step, per_second)
+                passed = turns - anchor
+                for _ in range(sided):
+                    passed += side.drift[ANGLE]
+                    speed += side.drift[SPEED]
+                move_phases(drive, passed, phases)
                 fresh = step <= changing
-                known_forces(step, fresh, speed, change, phases, drive, data, side, s0, s1, 2 * n0, 2 * n1)
-            predict(s0, data.first.k, n0)
-            predict(s1, data.second.k, n1)
-            q0 = interface_motion(s0, data.first.k, data.first.length, n0, i0, q0_count)
-            q1 = interface_motion(s1, data.second.k, data.second.length, n1, i1, q1_count)
-            for j in range(i0):
-                q[j] = s0[q0 + j]
-            for j in range(i1):
-                q[i0 + j] = s1[q1 + j]
-            for j in range(rated * i0):
-                rates[j] = s0[q0 + i0 + j]
-            for j in range(rated * i1):
-                rates[i0 + j] = s1[q1 + i1 + j]
-            for _ in range(sided):
-                guess_forces(side, q, rates)
-            bearing_forces(
-                step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
-                data.step_s, balls,
-            )  # fmt: skip
-            mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
-            correct(s0, data.first.k, forces, 0, n0, i0)
-            correct(s1, data.second.k, forces, i0, n1, i1)
-            for j in range(accel.shape[0]):
-                accel[j, column + i] = 0.0
-            site_accelerations(
-                s0, data.first.k, data.first.length, known0, data.first.site_index, accel, column + i, n0, i0
-            )
-            site_accelerations(
-                s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
-                n1, i1,
-            )  # fmt: skip
-            for _ in range(sided):
-                joint_forces(step, side, forces, s0, s1, 2 * n0, 2 * n1, accel, column + i)
-            rotate_sites(phases, data, accel, column + i)
-            if step % data.oversampling == 0:
-                row = motion[samples]
-                row[0] = passed
-                row[1] = speed
-                at = put_states(s0, data.first, row, MOTION_COLUMNS)
-                at = put_states(s1, data.second, row, at)
-                for j in range(i0 + i1):
-                    row[at + j] = forces[j]
-                samples += 1
+                if fresh:
+                    known_inputs(step, change, drive, data, inputs)
+                    apply_known(inputs, data.first, s0, known0, n0)
+                    apply_known(inputs, data.second, s1, known1, n1)
+                for _ in range(sided):
+                    known_forces(
+                        step, fresh, speed, change, phases, drive, data, side, s0, s1, 2 * n0, 2 * n1
+                    )
+                    fresh = True
+                if fresh:
+                    enter_known(s0, data.first.k, data.first.length, sites0, n0, i0, q0_count)
+                    enter_known(s1, data.second.k, data.second.length, sites1, n1, i1, q1_count)
+                q0 = interface_motion(s0, data.first.k, data.first.length, n0, i0, q0_count)
+                q1 = interface_motion(s1, data.second.k, data.second.length, n1, i1, q1_count)
+                for j in range(i0):
+                    q[j] = s0[q0 + j]
+                for j in range(i1):
+                    q[i0 + j] = s1[q1 + j]
+                for j in range(rated * i0):
+                    rates[j] = s0[q0 + i0 + j]
+                for j in range(rated * i1):
+                    rates[i0 + j] = s1[q1 + i1 + j]
+                for _ in range(sided):
+                    guess_forces(side, q, rates)
+                bearing_forces(
+                    step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
+                    data.step_s, balls,
+                )  # fmt: skip
+                for _ in range(sided):
+                    look_up(phases, speed, drive, data.meshes, meshes)
+                for _ in range(1 - sided):
+                    between_nodes(step - before, stride, data.step_s, nodes, meshes)
+                mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
+                remember_forces(s0, forces, 0, n0, i0)
+                remember_forces(s1, forces, i0, n1, i1)
+                for j in range(accel.shape[0]):
+                    accel[j, column + i] = 0.0
+                site_accelerations(
+                    s0, data.first.k, data.first.length, known0, data.first.site_index, accel, column + i,
+                    n0, i0,
+                )  # fmt: skip
+                site_accelerations(
+                    s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
+                    n1, i1,
+                )  # fmt: skip
+                for _ in range(1 - sided):
+                    advance(s0, data.first.k, forces, 0, n0, i0)
+                    advance(s1, data.second.k, forces, i0, n1, i1)
+                for _ in range(sided):
+                    correct(s0, data.first.k, forces, 0, n0, i0)
+                    correct(s1, data.second.k, forces, i0, n1, i1)
+                    joint_forces(step, side, forces, s0, s1, 2 * n0, 2 * n1, accel, column + i)
+                    predict(s0, data.first.k, n0)
+                    predict(s1, data.second.k, n1)
+                rotate_sites(phases, data, accel, column + i)
+                if step % data.oversampling == 0:
+                    row = motion[samples]
+                    row[0] = passed
+                    row[1] = speed
+                    at = put_states(s0, data.first, row, MOTION_COLUMNS)
+                    at = put_states(s1, data.second, row, at)
+                    for j in range(i0 + i1):
+                        row[at + j] = forces[j]
+                    samples += 1
+            before = behind
         return samples
 
     return compiled(run, allocates=False)

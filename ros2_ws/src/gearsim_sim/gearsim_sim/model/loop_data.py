@@ -22,7 +22,7 @@ class Part(NamedTuple):
 
     k: Array  # `kernel.pack_constants`
     length: int  # 2 nm, see `kernel.times_state`
-    left_known: Array  # (inputs, 2 nm) modal force per known input
+    left_known: Array  # (inputs, 2 nm) force on the modes per known input, within a step
     site_known: Array  # (sites, inputs) acceleration per known input
     site_index: Indices  # (sites,) output row that each site adds to
     state_rows: Array  # (rows, 2 nm) outputs of the state at the output samples

@@ -8,11 +8,22 @@ from gearsim_sim.integrate.compiled import inlined
 from gearsim_sim.integrate.pieces import table_value
 from gearsim_sim.model.bearing_loop import severity
 from gearsim_sim.model.loop_data import Array, Drive, Meshes
+from gearsim_sim.model.mesh_nodes import mesh_functions
 from gearsim_sim.model.tooth.contact import FREE_PLAY_M
 
 _OWN = 4  # first column behind those of the severity
-# Columns of `work`: stiffness, transmission error, its rate per turn and second, backlash, lead gap.
-WORK_COLUMNS = 5
+# Rows of `work` (WORK_ROWS, meshes): stiffness, transmission error, its rate per second, backlash, lead gap.
+WORK_ROWS = 5
+
+
+@inlined
+def look_up(phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
+    """Stiffness, error and its rate of all meshes without faults and pulses, straight from the tables."""
+    for i in range(meshes.places.shape[0]):
+        stiffness, _, error, rate = mesh_functions(i, phases, drive, meshes)
+        work[0, i] = stiffness
+        work[1, i] = error
+        work[2, i] = speed_hz * rate
 
 
 @inlined
@@ -22,48 +33,46 @@ def mesh_forces(
 ) -> None:  # fmt: skip
     """Forces of the meshes beyond their linear part: variation of stiffness, and transmission error.
 
-    `rates` of the interfaces are zero unless `drive.need_rates`; `work` is (meshes, WORK_COLUMNS).
+    The first rows of `work` hold the functions of the healthy mesh, by `look_up` or `between_nodes`.
+    `rates` of the interfaces are zero unless `drive.need_rates`.
     """
     count = meshes.places.shape[0]
     for i in range(count):
-        track = meshes.places[i, 1]
-        turns = phases[track] * meshes.numbers[i, 2] + meshes.numbers[i, 3]
-        work[i, 0], _ = table_value(turns, meshes.tables, meshes.places[i, 2], meshes.places[i, 3])
-        if meshes.numbers[i, 6] != 0.0:
-            length = abs(speed_hz * drive.rates[track] * meshes.numbers[i, 2]) * meshes.step_s
-            mean = pulse_mean(turns - meshes.numbers[i, 4], length, meshes.numbers[i, 5])
-            work[i, 0] += meshes.numbers[i, 6] * mean
-        error = 0.0
-        rate = 0.0
-        for j in range(meshes.places[i, 4], meshes.places[i, 5]):
-            track = meshes.errors[j, 0]
-            value, slope = table_value(phases[track], meshes.tables, meshes.errors[j, 1], meshes.errors[j, 2])
-            error += value
-            rate += drive.rates[track] * slope
-        work[i, 1] = error
-        work[i, 2] = rate
-        work[i, 3] = 0.0
-        work[i, 4] = 0.0
-    add_mods(step, phases, drive, work)
+        work[3, i] = 0.0
+        work[4, i] = 0.0
+    add_tooth_pulses(phases, speed_hz, drive, meshes, work)
+    add_mods(step, phases, speed_hz, drive, work)
     add_pulses(step, phases, speed_hz, drive, meshes, work)
     add_terms(step, drive, work)
     for i in range(count):
         at = meshes.places[i, 0]
-        stiffness = work[i, 0]
-        slack = work[i, 3] + work[i, 4]
+        stiffness = work[0, i]
+        slack = work[3, i] + work[4, i]
         if slack == 0.0:
-            damper = meshes.numbers[i, 1] * (speed_hz * work[i, 2])
-            forces[at] = -((stiffness - meshes.numbers[i, 0]) * q[at] + stiffness * work[i, 1] + damper)
+            damper = meshes.numbers[i, 1] * work[2, i]
+            forces[at] = -((stiffness - meshes.numbers[i, 0]) * q[at] + stiffness * work[1, i] + damper)
         else:
             linear = meshes.numbers[i, 0] * q[at] + meshes.numbers[i, 1] * rates[at]
-            rate = rates[at] + speed_hz * work[i, 2]
+            rate = rates[at] + work[2, i]
             forces[at] = linear - tooth_force(
-                q[at] + work[i, 1], rate, stiffness, meshes.numbers[i, 1], work[i, 3], work[i, 4]
+                q[at] + work[1, i], rate, stiffness, meshes.numbers[i, 1], work[3, i], work[4, i]
             )
 
 
 @inlined
-def add_mods(step: int, phases: Array, drive: Drive, work: Array) -> None:
+def add_tooth_pulses(phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
+    """Rectangular parts of the stiffness of meshes that have one."""
+    for i in range(meshes.places.shape[0]):
+        if meshes.numbers[i, 6] != 0.0:
+            track = meshes.places[i, 1]
+            turns = phases[track] * meshes.numbers[i, 2] + meshes.numbers[i, 3]
+            length = abs(speed_hz * drive.rates[track] * meshes.numbers[i, 2]) * meshes.step_s
+            mean = pulse_mean(turns - meshes.numbers[i, 4], length, meshes.numbers[i, 5])
+            work[0, i] += meshes.numbers[i, 6] * mean
+
+
+@inlined
+def add_mods(step: int, phases: Array, speed_hz: float, drive: Drive, work: Array) -> None:
     """What faults change of stiffness and transmission error, smoothly."""
     for j in range(drive.mesh_mods.shape[0]):
         row = drive.mesh_mods[j]
@@ -71,10 +80,10 @@ def add_mods(step: int, phases: Array, drive: Drive, work: Array) -> None:
         now = severity(row, step)
         value, slope = table_value(phases[track], drive.samples, int(row[_OWN + 3]), int(row[_OWN + 4]))
         if row[_OWN + 1] == 0.0:
-            work[mesh, 0] += now * value
+            work[0, mesh] += now * value
         else:
-            work[mesh, 1] += now * value
-            work[mesh, 2] += now * drive.rates[track] * slope
+            work[1, mesh] += now * value
+            work[2, mesh] += now * speed_hz * drive.rates[track] * slope
 
 
 @inlined
@@ -105,13 +114,13 @@ def add_pulses(step: int, phases: Array, speed_hz: float, drive: Drive, meshes: 
         length = abs(speed_hz * drive.rates[track]) * meshes.step_s
         value = height * pulse_mean(place, length, width)
         if row[_OWN + 1] == 0.0:
-            work[mesh, 0] += value
+            work[0, mesh] += value
         else:
-            work[mesh, 1] += value
+            work[1, mesh] += value
             if length >= 1e-12:
                 after = pulse_mean(place + 0.5 * length, 0.0, width)
                 before = pulse_mean(place - 0.5 * length, 0.0, width)
-                work[mesh, 2] += height * drive.rates[track] * (after - before) / length
+                work[2, mesh] += height * speed_hz * drive.rates[track] * (after - before) / length
 
 
 @inlined
@@ -119,7 +128,7 @@ def add_terms(step: int, drive: Drive, work: Array) -> None:
     """What faults add to backlash and lead gap."""
     for j in range(drive.mesh_terms.shape[0]):
         row = drive.mesh_terms[j]
-        work[int(row[_OWN]), 3 + int(row[_OWN + 1])] += severity(row, step) * row[_OWN + 2]
+        work[3 + int(row[_OWN + 1]), int(row[_OWN])] += severity(row, step) * row[_OWN + 2]
 
 
 @inlined

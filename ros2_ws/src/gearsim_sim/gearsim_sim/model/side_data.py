@@ -62,7 +62,6 @@ class Side(NamedTuple):
     """What the loop needs; N = modes of both parts (real and imaginary), I = interfaces of both parts."""
 
     active: int  # 1 if there is anything at all
-    left: Array  # (directions, N) modal force per newton
     step: Array  # (directions, N) what a newton at the new instant adds to the mode coordinates
     rows: Array  # (directions, N) displacement
     rate_rows: Array  # (directions, N)
@@ -100,7 +99,6 @@ class SidePart:
 class Directions:
     """Everything that depends on the directions only; see `Side`."""
 
-    left: Array
     step: Array
     rows: Array
     rate_rows: Array
@@ -126,7 +124,7 @@ def work_out(
     vectors = np.array([system.direction(one) for one in directions]).reshape(count, len(system.dof_names))
     sizes = [2 * (part.propagator.modes if part.propagator is not None else 0) for part in parts]
     interfaces = sum(part.interfaces for part in parts)
-    modal = {name: np.zeros((count, sum(sizes))) for name in ("left", "step", "rows", "rate_rows")}
+    modal = {name: np.zeros((count, sum(sizes))) for name in ("step", "rows", "rate_rows")}
     known, full = np.zeros((2, count, site_rows))
     motions, back, back_rate = np.zeros((count, 2 * interfaces)), *np.zeros((2, count, interfaces))
     own, own_rate = np.zeros((2, count, count))
@@ -165,14 +163,12 @@ def _part_response(system: LinearSystem, part: SidePart, vectors: Array) -> dict
     assert propagator is not None
     linear, modes = propagator.linear, propagator.modes
     first_weight = cubic_weights(linear.eigenvalues, propagator.step_s)[0]
-    modal = linear.left @ vectors.T  # (m, directions)
-    step = first_weight[:, None] * modal
+    step = first_weight[:, None] * (linear.left @ vectors.T)  # (m, directions)
     rows, rates = vectors @ linear.shapes, vectors @ linear.shapes_rate
     by_interfaces = first_weight[:, None] * (linear.left @ system.interfaces)
     known = part.sites @ linear.compliance @ vectors.T
     within = (part.sites @ linear.acceleration @ step).real
     return {
-        "left": _flat(modal.T, modes),
         "step": _flat(step.T, modes),
         "rows": propagator.output_rows(rows),
         "rate_rows": propagator.output_rows(rates),

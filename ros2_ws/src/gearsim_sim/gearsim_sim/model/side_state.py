@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_sim.integrate.kernel import add_history
 from gearsim_sim.model.assembly import Vector
 from gearsim_sim.model.known_loop import ANGLE, SPEED
 from gearsim_sim.model.loop_data import SEVERITY_COLUMNS
@@ -181,10 +182,9 @@ class SideState:
             if isinstance(row.contribution, SideOscillator):
                 now += self._hanging(row, state)
         place = 0
-        for n2, state in zip(self._sizes, states, strict=True):
-            modal = now @ side.left[:, place : place + n2]
-            for history in range(3, 6):
-                state[history * n2 : (history + 1) * n2] += modal
+        for part, n2, state in zip(self._parts, self._sizes, states, strict=True):
+            if part.propagator is not None:
+                add_history(part.propagator, state, now @ side.step[:, place : place + n2])
             place += n2
         self._start_drift(rows, phases, step, speed_hz)
 
