@@ -40,7 +40,7 @@ def test_nodes_of_a_sine_leave_the_error_that_was_asked_for(plant):
     assert 0.5e-5 < found < 1e-5
 
 
-def test_errors_and_their_rates_between_nodes(plant):
+def test_errors_and_their_rates_between_nodes():
     """Value and slope of the polynomial t^3 are exact at any place, in steps of 0.1 s."""
     nodes, work = np.zeros((NODE_ROWS, 2)), np.zeros((5, 2))
     nodes[6, 1], nodes[7, 1] = 64.0, 48.0  # at step 4; at step 0 all is zero

@@ -79,7 +79,7 @@ class Propagator:
         """c_1 to c_3 over c_0, flat (3 * 2 modes,); zero where modes are filled up."""
         first, *others = (one[: self.modes] + 1j * one[self.modes :] for one in self.weights.reshape(4, -1))
         safe = np.where(first == 0, 1.0, first)
-        return _flat_complex(np.array(others) / safe, self.modes).ravel()
+        return _flat_complex(np.array(others, dtype=np.complex128) / safe, self.modes).ravel()
 
     def within(self, modal: NDArray[np.float64]) -> NDArray[np.float64]:
         """What modal forces (rows, 2 modes) at the new instant add to the mode coordinates in the step."""
