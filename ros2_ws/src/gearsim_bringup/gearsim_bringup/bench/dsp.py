@@ -7,27 +7,23 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import rfft
-from scipy.signal import butter, hilbert, sosfiltfilt
 
-from gearsim_bringup.bench import separation, synchronous
+from gearsim_bringup.bench import cyclic, separation, synchronous
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
 from gearsim_dsp.diagnose import diagnose_record
-from gearsim_dsp.envelope import envelope_spectrum, squared_envelopes, window_spectrum
 from gearsim_dsp.kurtogram import fast_kurtogram
 from gearsim_io.machines import load_machine
 from gearsim_io.record import Record
 
 RATE_HZ = 65536.0
 SECONDS = 10.0
-BAND_HZ = (4000.0, 8000.0)
 LEVELS = 7
 
 
 def measure(_voice: Voice) -> Iterator[Figure]:
-    """Kurtogram, squared envelope spectrum, separation, and the diagnosis of a record of one channel."""
+    """Kurtogram, envelope spectra and coherence, separation, and the diagnosis of a record of one channel."""
     signal = _signal()
     single = signal.astype(np.float32)  # what records and streams hold
     try:
@@ -40,8 +36,7 @@ def measure(_voice: Voice) -> Iterator[Figure]:
             lambda: fast_kurtogram(single, RATE_HZ, LEVELS), lambda: theirs(single, LEVELS, RATE_HZ), 3
         )
         yield Figure("dsp.kurtogram_s", own, "s", Goal("<=", 0.5, on_ratio=True), ("PySDKit 0.5.0", peer))
-    own, peer = alternate(lambda: _ses(signal), lambda: _plain_ses(signal))
-    yield Figure("dsp.ses_s", own, "s", Goal("<=", 1, on_ratio=True), ("scipy band-pass + hilbert", peer))
+    yield from cyclic.figures(signal, RATE_HZ)
     yield from separation.figures(signal)
     yield from synchronous.figures(signal, RATE_HZ)
     machine = load_machine("unsw_parallel")
@@ -60,16 +55,3 @@ def _signal() -> NDArray[np.float64]:
     t = np.arange(800) / RATE_HZ
     ringing = np.exp(-1200 * t) * np.sin(2 * np.pi * 6000 * t)
     return generator.normal(0, 0.3, count) + np.convolve(knocks, ringing)[:count]
-
-
-def _ses(signal: NDArray[np.float64]) -> NDArray[np.float64]:
-    band = np.array([BAND_HZ[0]])
-    return envelope_spectrum(
-        squared_envelopes(window_spectrum(signal, RATE_HZ), band, BAND_HZ[1] - BAND_HZ[0])
-    )[0]
-
-
-def _plain_ses(signal: NDArray[np.float64]) -> NDArray[np.float64]:
-    sections = butter(4, BAND_HZ, "bandpass", fs=RATE_HZ, output="sos")
-    squared = np.abs(hilbert(sosfiltfilt(sections, signal))) ** 2
-    return np.abs(rfft(squared - squared.mean())) ** 2
