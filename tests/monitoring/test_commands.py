@@ -13,12 +13,12 @@ from gearsim_bringup.monitoring.files import FILES, read_file, write_files
 from gearsim_io.errors import InputError
 
 
-def test_what_runs_follows_from_the_options():
+def test_what_runs_follows_from_the_options(tmp_path):
     usual = choose(",".join(MONITORS), "none", None, None)
     assert usual == Choice()
     assert [spec.name for spec in usual.specs()] == list(MONITORS)
     assert usual.listeners == 2
-    every = choose("all", "error", "0.0.0.0:9000", "broker.local")
+    every = choose("all", "error", "0.0.0.0:9000", "broker.local", tmp_path, 30.0)
     assert every.monitors == ALL_MONITORS
     assert [spec.name for spec in every.specs()] == [
         "exporter",
@@ -32,7 +32,8 @@ def test_what_runs_follows_from_the_options():
     nodes = {spec.name: spec for spec in every.specs()}
     assert nodes["exporter"].parameters == {"host": "0.0.0.0", "port": 9000}
     assert nodes["mqtt"].parameters == {"host": "broker.local", "port": 1883}
-    assert nodes["gear"].parameters == {"latch": "error"}
+    assert nodes["envelope"].parameters == {"latch": "error"}
+    assert nodes["gear"].parameters == {"latch": "error", "baseline_dir": str(tmp_path), "learn_s": 30.0}
 
 
 @pytest.mark.parametrize(

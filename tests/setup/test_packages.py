@@ -21,6 +21,7 @@ DISTRIBUTIONS = {
     "ruamel": "ruamel-yaml",
     "rerun": "rerun-sdk",
     "rerun_cli": "rerun-sdk",
+    "paho": "paho-mqtt",
     "pydantic_core": "pydantic",
 }
 # What `bench --peers` installs into an environment of its own, where alone it is imported.

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gearsim_bringup.monitoring.choice import Choice
-from gearsim_bringup.monitoring.options import choose, monitor_options
+from gearsim_bringup.monitoring.options import monitor_options
 from gearsim_bringup.options import ANY_PATH, FiniteRange, example
 from gearsim_bringup.processes import NodeSpec
 
@@ -29,10 +29,7 @@ def command(
     rate: float,
     loop: bool,
     diagnose: bool,
-    monitors: str,
-    latch: str,
-    prometheus: str | None,
-    mqtt: str | None,
+    choice: Choice,
 ) -> int:
     """Play a BAG on the topics it was recorded from, with /clock.
 
@@ -40,14 +37,13 @@ def command(
     """
     from gearsim_bringup.live import player
 
-    chosen = choose(monitors, latch, prometheus, mqtt)
     if not diagnose:
         from gearsim_io.nodes.player import main
 
         spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)
         return int(main(["gearsim", *spec.arguments()]))
-    source = player(bag, rate=rate, loop=loop, listeners=chosen.listeners, signals_only=True)
-    _judge(bag, source, chosen)
+    source = player(bag, rate=rate, loop=loop, listeners=choice.listeners, signals_only=True)
+    _judge(bag, source, choice)
     return 0
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import click
 
 from gearsim_bringup.first_use import tell_first_use
-from gearsim_bringup.monitoring.options import choose, monitor_options
+from gearsim_bringup.monitoring.choice import Choice
+from gearsim_bringup.monitoring.options import monitor_options
 from gearsim_bringup.options import ANY_PATH, POSITIVE, FiniteRange, example
 from gearsim_bringup.ui import Voice
 
@@ -35,10 +36,7 @@ def command(
     rate: float | None,
     bag: Path | None,
     rrd: Path | None,
-    monitors: str,
-    latch: str,
-    prometheus: str | None,
-    mqtt: str | None,
+    choice: Choice,
 ) -> None:
     """Run simulator and diagnostic nodes live on a SCENARIO (a shipped name, or a YAML file).
 
@@ -57,8 +55,7 @@ def command(
 
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)
-    chosen = choose(monitors, latch, prometheus, mqtt)
-    listeners = chosen.listeners + (bag is not None) + (rrd is not None)
+    listeners = choice.listeners + (bag is not None) + (rrd is not None)
     source = simulator(str(Path(loaded.source)), end_after=seconds or 0.0, rate=rate, listeners=listeners)
     custom: dict[str, Any] = {"scenario": loaded.name, "seed": str(loaded.seed)}
     with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
@@ -66,7 +63,7 @@ def command(
         tell_first_use(voice)
         voice.say("topics under /gearsim; Ctrl-C ends the run")
         try:
-            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth, chosen).run()
+            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth, choice).run()
         finally:  # also after Ctrl-C, the usual end
             for path in (bag, rrd):
                 if path is not None and path.exists():

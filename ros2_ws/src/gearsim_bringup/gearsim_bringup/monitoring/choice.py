@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from gearsim_bringup.processes import NodeSpec
 from gearsim_io.errors import InputError
@@ -14,6 +15,7 @@ MONITORS = ("envelope", "kurtosis")
 
 ALL_MONITORS = (*MONITORS, "gear", "trend")
 _OF_RESULTS = ("trend",)
+_LEARNING = ("gear", "trend")
 EXPORTER_PORT, MQTT_PORT = 9812, 1883
 
 
@@ -21,13 +23,16 @@ EXPORTER_PORT, MQTT_PORT = 9812, 1883
 class Choice:
     """Diagnostic nodes of `ALL_MONITORS`, which of their levels latch, and addresses of the stacks.
 
-    `prometheus` is where the exporter listens, `mqtt` where the broker is: (host, port).
+    `prometheus` is where the exporter listens, `mqtt` where the broker is: (host, port). `baselines` is the
+    folder of learnt baselines and `learn_s` how long to learn; empty and 0: as the nodes have it.
     """
 
     monitors: tuple[str, ...] = MONITORS
     latch: str = "none"
     prometheus: tuple[str, int] | None = None
     mqtt: tuple[str, int] | None = None
+    baselines: str = ""
+    learn_s: float = 0.0
 
     @property
     def listeners(self) -> int:
@@ -42,11 +47,25 @@ class Choice:
                 values: dict[str, str | int] = {"host": address[0], "port": address[1]}
                 found.append(NodeSpec(name, f"gearsim_bringup.monitoring.nodes.{name}", values))
         order = sorted(self.monitors, key=lambda name: name not in _OF_RESULTS)
-        parameters = {"latch": self.latch}
-        return found + [NodeSpec(name, f"gearsim_dsp.nodes.{name}", parameters) for name in order]
+        return found + [NodeSpec(n, f"gearsim_dsp.nodes.{n}", self._parameters(n)) for n in order]
+
+    def _parameters(self, name: str) -> dict[str, str | float]:
+        parameters: dict[str, str | float] = {"latch": self.latch}
+        if name in _LEARNING and self.baselines:
+            parameters["baseline_dir"] = self.baselines
+        if name in _LEARNING and self.learn_s:
+            parameters["learn_s"] = float(self.learn_s)
+        return parameters
 
 
-def choose(monitors: str, latch: str, prometheus: str | None, mqtt: str | None) -> Choice:
+def choose(
+    monitors: str,
+    latch: str,
+    prometheus: str | None,
+    mqtt: str | None,
+    baselines: Path | None = None,
+    learn_s: float | None = None,
+) -> Choice:
     """What was asked for on the command line.
 
     Raises
@@ -63,6 +82,8 @@ def choose(monitors: str, latch: str, prometheus: str | None, mqtt: str | None) 
         latch,
         None if prometheus is None else _address(prometheus, "--prometheus", EXPORTER_PORT),
         None if mqtt is None else _address(mqtt, "--mqtt", MQTT_PORT),
+        "" if baselines is None else str(baselines.absolute()),
+        learn_s or 0.0,
     )
 
 
