@@ -16,10 +16,11 @@ from gearsim_dsp.families import FamilyEvidence
 from gearsim_dsp.kinematics import fault_families
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker
-from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
+from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.band_keeper import BandKeeper
 from gearsim_dsp.streams.report import Report
+from gearsim_dsp.streams.window_speeds import LiveSpeeds, WindowSpeeds
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
@@ -75,6 +76,8 @@ class EnvelopeMonitor:
     settings : EnvelopeSettings
     source : str
         Name in what is published.
+    speeds : WindowSpeeds, optional
+        Where the windows' speeds come from, if not from their own angle signals and vibration.
 
     Raises
     ------
@@ -83,7 +86,11 @@ class EnvelopeMonitor:
     """
 
     def __init__(
-        self, machine: Machine, settings: EnvelopeSettings | None = None, source: str = "envelope"
+        self,
+        machine: Machine,
+        settings: EnvelopeSettings | None = None,
+        source: str = "envelope",
+        speeds: WindowSpeeds | None = None,
     ) -> None:
         self.machine = machine
         self.settings = settings or EnvelopeSettings()
@@ -96,7 +103,7 @@ class EnvelopeMonitor:
         self._keeper = BandKeeper(machine, every, self.settings.window.hop_s)
         find_faults(machine, self._pool)  # an impossible nameplate is told now, not at the first window
         self._families = fault_families(machine)
-        self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
+        self._speeds = speeds or LiveSpeeds(machine)
         self._run = 0
 
     @property
@@ -116,14 +123,16 @@ class EnvelopeMonitor:
         if window.run != self._run:
             self._pool.reset()
             self._keeper.reset()
+            self._speeds.reset()
             self._run = window.run
-        length, rate_hz = window.sample_count, window.sample_rate_hz
-        speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+        speed = self._speeds.of(window)
         self._keeper.renew(window, speed.value_hz)
         results = [self._analyse(window, row, speed) for row in range(len(window.channels))]
+        quality = tuple(issue for result in results for issue in result.quality) + self._speeds.issues
+        if self._speeds.lost:
+            results = []  # on no known axis
         self._pool.add(results)
         verdict = find_faults(self.machine, self._pool)
-        quality = tuple(issue for result in results for issue in result.quality)
         judged = any(result.spectra for result in results)
         return Report(
             run=window.run,
@@ -160,6 +169,8 @@ class EnvelopeMonitor:
         fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
         if fatal:
             return "; ".join(fatal[:3])
+        if self._speeds.lost:
+            return "the speed changes, and was not found in the vibration of this window"
         if not self.machine.bearings:
             return "the nameplate lists no bearings: no fault can be looked for"
         if not math.isfinite(speed.value_hz):
