@@ -184,9 +184,7 @@ def _drawn(base: Scenario, model: EnsembleModel, number: int, where: str) -> Nam
         changes["speed_hz"] = between("speed", random.speed.low, random.speed.high)
     if random.load is not None:
         changes["load_nm"] = between("load", random.load.low, random.load.high)
-    chosen = {"seed": float(changes["seed"])} | {
-        key: changes[key] for key in ("speed_hz", "load_nm") if key in changes
-    }
+    chosen = _numbers(changes)
     severity = {name: between(f"severity {name}", one.low, one.high) for name, one in random.severity.items()}
     changes["faults"] = tuple(
         dataclasses.replace(fault, severity=severity.get(fault.name, fault.severity)) for fault in base.faults
@@ -225,9 +223,7 @@ def _given(base: Scenario, model: VariantModel, number: int, seed: int) -> Named
     if model.faults is not None:
         changes["faults"] = tuple(fault.spec() for fault in model.faults)
     changes["parameters"] = {**base.parameters, **model.parameters}
-    chosen: dict[str, float | str] = {
-        key: changes[key] for key in ("seed", "speed_hz", "load_nm") if key in changes
-    }
+    chosen = _numbers(changes)
     chosen |= {name: str(value) for name, value in model.parameters.items()}
     return NamedVariant(model.name or f"variant_{number}", dataclasses.replace(base, **changes), chosen)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearsim_sim.model.bearing_faults import SurfaceProfile
-from gearsim_sim.model.faults.bearing_parts import Length, ball_number, find_seat
+from gearsim_sim.model.faults.bearing_parts import Length, ball_number, balls_of, find_seat
 from gearsim_sim.model.faults.kind import FaultKind, bearing_names
 from gearsim_sim.model.faults.race_waviness import check_lobes
 from gearsim_sim.model.plant import Plant
@@ -22,7 +22,7 @@ class BallWavinessParams(Strict):
     amplitudes_m: tuple[Length, ...] = (0.3e-6, 0.15e-6, 0.1e-6, 0.07e-6)
     """Amplitude of each, of the radius."""
     row: Count = 1
-    """Row of elements, from 1."""
+    """Row of the element, from 1."""
     ball: Count | None = None
     """Element of the row, from 1; by default all of all rows, each in a phase of its own."""
 
@@ -31,6 +31,7 @@ def place(params: BallWavinessParams, component: str, plant: Plant, seed: int) -
     """One profile for each element, at a phase of its own."""
     index, seat = find_seat(plant, component)
     check_lobes(component, params.orders, params.amplitudes_m)
+    balls_of(seat, params.row)  # is there such a row?
     if params.ball is None:
         balls = range(seat.law.ball_count)
     else:

@@ -17,6 +17,7 @@ from gearsim_sim.model.faults.bearing_parts import (
     race_of,
 )
 from gearsim_sim.model.faults.kind import FaultKind, bearing_names
+from gearsim_sim.model.oil_film import ContactGeometry
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.surface import rough_series, rough_zone
 from gearsim_sim.params.fields import Count, Strict
@@ -51,7 +52,7 @@ def place(params: RoughnessParams, component: str, plant: Plant, seed: int) -> t
     first, balls = balls_of(seat, params.row)
     circumference = 2 * math.pi * radius
     _check(params, seat, circumference)
-    cutoff = shortest_wavelength_m(params, seat) if params.cutoff_m is None else params.cutoff_m
+    cutoff = _cutoff_m(params, seat)
     surface = rough_series(
         seed, f"{component}/extended_roughness/{params.race}", circumference, params.roughness_m, cutoff
     )
@@ -67,9 +68,31 @@ def shortest_wavelength_m(params: RoughnessParams, seat: BearingSeat) -> float:
     The patch averages over its length; one half of a wave of twice that length is left. A wave of rms s and
     length l has the rms curvature s (2 pi / l)^2; where that exceeds 1 / r the element bridges the valleys.
     """
-    contact = seat.law.contacts[0 if params.race is Race.INNER else 1]
+    contact = _contact(params, seat)
     bridging = 2 * math.pi * math.sqrt(params.roughness_m * contact.rolling_m)
     return max(4 * contact.patch_half_length_m, bridging)
+
+
+def _contact(params: RoughnessParams, seat: BearingSeat) -> ContactGeometry:
+    return seat.law.contacts[0 if params.race is Race.INNER else 1]
+
+
+def _cutoff_m(params: RoughnessParams, seat: BearingSeat) -> float:
+    """Shortest wavelength, of which two must fit into the zone: else its bottom is not rough."""
+    longest = 0.5 * params.length_m
+    if params.cutoff_m is not None:
+        if params.cutoff_m > longest:
+            raise InputError(seat.name, "cutoff_m", params.cutoff_m, "at most half of length_m")
+        return params.cutoff_m
+    shortest = shortest_wavelength_m(params, seat)
+    if shortest > longest:
+        greatest = (longest / (2 * math.pi)) ** 2 / _contact(params, seat).rolling_m
+        if params.roughness_m > greatest:
+            expected = f"at most {greatest * 1e6:.3g} um in a zone of this length: elements bridge the rest"
+            raise InputError(seat.name, "roughness_m", params.roughness_m, expected)
+        expected = f"at least {2 * shortest * 1e3:.3g} mm, two of the shortest waves that elements follow"
+        raise InputError(seat.name, "length_m", params.length_m, expected)
+    return shortest
 
 
 def _check(params: RoughnessParams, seat: BearingSeat, circumference: float) -> None:
