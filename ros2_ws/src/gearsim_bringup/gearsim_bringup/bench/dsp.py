@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_bringup.bench import cyclic, separation, synchronous
+from gearsim_bringup.bench import angle, cyclic, separation, synchronous
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
 from gearsim_bringup.ui import Voice
@@ -38,6 +38,7 @@ def measure(_voice: Voice) -> Iterator[Figure]:
         yield Figure("dsp.kurtogram_s", own, "s", Goal("<=", 0.5, on_ratio=True), ("PySDKit 0.5.0", peer))
     yield from cyclic.figures(signal, RATE_HZ)
     yield from separation.figures(signal)
+    yield from angle.figures(signal, RATE_HZ)
     yield from synchronous.figures(signal, RATE_HZ)
     machine = load_machine("unsw_parallel")
     record = Record(RATE_HZ, (machine.channels[0].name,), "m/s^2", single[None, :])
