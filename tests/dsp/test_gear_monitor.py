@@ -51,6 +51,12 @@ def record(seconds, seed=1, fault_at_s=math.inf, on=1.0, depth=0.6, unbalance_at
     return Record(RATE_HZ, ("a", "b"), "m/s^2", data.astype(np.float32), (tacho,), machine="gear_rig")
 
 
+def noise(seconds):
+    """Nothing that turns, and no tacho."""
+    data = np.random.default_rng(4).standard_normal((2, round(seconds * RATE_HZ))).astype(np.float32)
+    return Record(RATE_HZ, ("a", "b"), "m/s^2", data, (), machine="gear_rig")
+
+
 def run(rec, machine=MACHINE, settings=SETTINGS, monitor=None):
     watch = monitor or AlarmedMonitor(
         GearMonitor(machine, settings), AlarmSettings(raise_windows=3, of_windows=4)
@@ -95,6 +101,15 @@ def test_a_sound_machine_raises_nothing(seed):
     assert not watch.present.stale
 
 
+def test_without_a_tacho_the_angle_is_followed_in_the_vibration():
+    machine = replace(MACHINE, tacho_shafts=())
+    settings = GearSettings(WindowSettings(window_s=2.0, hop_s=1.0), learn_s=15.0)
+    watch, outcomes, alarms = run(replace(record(25.0, fault_at_s=20.0), tachos=()), machine, settings)
+    assert not watch.present.stale
+    assert {f.speed_source for f in outcomes[-1].report.features} == {"estimated"}
+    assert {a.component for a in alarms} == {"gears.pinion"}
+
+
 def test_before_anything_is_learnt_it_says_so():
     watch, outcomes, _ = run(record(10.0))
     assert watch.present.stale
@@ -117,7 +132,7 @@ def test_output_does_not_depend_on_the_size_of_batches():
     ("machine", "rec", "words"),
     [
         (replace(MACHINE, gear_meshes=()), record(5.0), "lists no gear meshes"),
-        (replace(MACHINE, tacho_shafts=()), replace(record(5.0), tachos=()), "no tacho and no encoder"),
+        (replace(MACHINE, tacho_shafts=()), noise(5.0), "no angle of the shafts in this window"),
         (
             replace(
                 MACHINE,

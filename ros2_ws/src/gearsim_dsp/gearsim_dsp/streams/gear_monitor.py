@@ -9,9 +9,12 @@ sidebands: wear, misalignment, eccentricity), or the lines of a shaft (unbalance
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from gearsim_dsp.alarms import Indication
+from gearsim_dsp.angle.tacholess import track_speed
 from gearsim_dsp.quality import QualityIssue, check_samples
 from gearsim_dsp.results import Features, FeatureValue
 from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
@@ -29,6 +32,8 @@ __all__ = ["GearMonitor", "GearSettings"]
 _KEEPS = 0.5
 _LOCAL = ("fm4", "m6a", "na4", "nb4")
 _SHOWN = 3
+_FOLLOWED = 2  # channels that the speed is followed on where there is no tacho
+_SURE = 0.8
 _MOST_EARLIER = 400
 
 
@@ -89,7 +94,8 @@ class GearMonitor:
     Parameters
     ----------
     machine : Machine
-        Its shafts and gear meshes say what is averaged; it needs a tacho or encoder.
+        Its shafts and gear meshes say what is averaged. Without tacho and encoder the angle is followed in
+        the vibration.
     settings : GearSettings
     source : str
         Name in what is published.
@@ -135,6 +141,8 @@ class GearMonitor:
             self.keeper.restart()
         length, rate_hz = window.sample_count, window.sample_rate_hz
         speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+        if speed.phase is None:
+            speed = self._followed(window, speed)
         quality: list[QualityIssue] = []
         rows: list[_Row] = []
         why = self._why_not(speed)
@@ -164,6 +172,21 @@ class GearMonitor:
             note="" if known else why or "; ".join(fatal[:3]) or self.keeper.why_not(speed.value_hz),
             quality=tuple(quality),
         )
+
+    def _followed(self, window: Window, speed: ShaftSpeed) -> ShaftSpeed:
+        """Angle and speed found in the vibration of the window, where it gives them with confidence."""
+        finite = [row for row in window.data if np.isfinite(row).all() and np.ptp(row) > 0]
+        if not finite or not self.machine.gear_meshes:
+            return speed
+        try:
+            signals = np.stack(finite[:_FOLLOWED])
+            track = track_speed(signals, window.sample_rate_hz, self.machine)
+        except InputError as error:
+            return replace(speed, note=str(error))
+        if track.confidence >= _SURE:
+            return track.shaft_speed()
+        doubt = f"the vibration tells the speed with a confidence of {track.confidence:.1f} only"
+        return replace(speed, note=f"no angle signal, and {doubt}")
 
     def _why_not(self, speed: ShaftSpeed) -> str:
         if not self.machine.gear_meshes:
