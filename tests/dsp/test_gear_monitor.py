@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -189,3 +191,20 @@ def test_a_baseline_that_was_stored_is_used_at_once():
     assert {a.component for a in alarms} == {"gears.pinion"}
     values = {(v.component, v.name): v.value for v in outcomes[-1].report.features[0].values}
     assert values["gears.pinion", "na4"] > 2 * values["gears.pinion", "fm4"]  # level counts beside shape
+
+
+def test_memory_does_not_grow_with_the_length_of_the_stream():
+    watch = AlarmedMonitor(GearMonitor(MACHINE, GearSettings(SETTINGS.window, learn_s=10.0)))
+    held = []
+    gc.collect()
+    tracemalloc.start()
+    try:
+        for k, batch in enumerate(record(60.0).batches(1024)):
+            watch.push(batch)
+            if k in (480, 950):  # at 30 and at 59 s; each second has 8 batches of samples and 8 of the tacho
+                gc.collect()
+                held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert len(held) == 2
+    assert held[1] - held[0] < 20_000  # half a minute of samples would be 1.9 MB

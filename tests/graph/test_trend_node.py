@@ -186,6 +186,28 @@ def reset(rig):
     assert future.result().success
 
 
+def test_the_gear_node_learns_judges_and_tells_what_stands_out(ros_domain, tmp_path):
+    from test_gear_monitor import MACHINE, RATE_HZ
+    from test_gear_monitor import record as gear_record
+
+    rig = Rig(ros_domain)
+    settings = {"baseline_dir": str(tmp_path), "learn_s": 15.0, "window_s": 1.0, "hop_s": 0.5}
+    node = rig.domain.start_node("gearsim_dsp.nodes.gear", settings)
+    alarms, features = rig.hear(qos.ALARM), rig.hear(qos.FEATURES)
+    rig.hear(qos.DIAGNOSTICS)
+    rig.connected()
+    rig.nameplate(MACHINE)
+    assert RATE_HZ == 8192.0  # that of the feeder's pace
+    rig.play(gear_record(24.0, fault_at_s=20.0).batches(1024))
+    rig.until(lambda: alarms)
+    assert (alarms[0].source, alarms[0].component) == ("gear", "gears.pinion")
+    assert "one tooth stands out" in alarms[0].reason
+    assert {f.source for f in features} == {"gear"}
+    assert (tmp_path / "gear_rig.gear.json").exists()
+    rig.until(lambda: rig.status("gear: baseline")[1] == "learnt from 15 s")
+    clean_end(node)
+
+
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [

@@ -1,6 +1,7 @@
-"""The live rig: simulator and diagnostic nodes, with a recorder if asked.
+"""The live rig: simulator and diagnostic nodes, with a recorder and ways to monitoring stacks if asked.
 
 ros2 launch gearsim_bringup rig.launch.py scenario:=demo bag:=/tmp/demo_bag
+ros2 launch gearsim_bringup rig.launch.py scenario:=gear_wear gear:=true trend:=true exporter:=true
 """
 
 from launch import LaunchDescription
@@ -26,6 +27,10 @@ def generate_launch_description():
         DeclareLaunchArgument(
             "bag", default_value="", description="folder to record to; empty: no recording"
         ),
+        DeclareLaunchArgument("gear", default_value="false", description="judge gears against a baseline"),
+        DeclareLaunchArgument("trend", default_value="false", description="follow all indicators"),
+        DeclareLaunchArgument("exporter", default_value="false", description="metrics at 127.0.0.1:9812"),
+        DeclareLaunchArgument("mqtt", default_value="false", description="to the broker at 127.0.0.1:1883"),
     ]
     simulator = Node(
         package="gearsim_sim",
@@ -43,6 +48,17 @@ def generate_launch_description():
         Node(package="gearsim_dsp", executable=name, namespace=namespace, output="screen")
         for name in ("envelope", "kurtosis")
     ]
+    asked_for = [
+        Node(
+            package=package,
+            executable=name,
+            namespace=namespace,
+            output="screen",
+            condition=IfCondition(LaunchConfiguration(name)),
+        )
+        for package, names in (("gearsim_dsp", ("trend", "gear")), ("gearsim_bringup", ("exporter", "mqtt")))
+        for name in names
+    ]
     recorder = Node(
         package="gearsim_io",
         executable="recorder",
@@ -51,4 +67,4 @@ def generate_launch_description():
         parameters=[{"bag": bag}],
         condition=IfCondition(PythonExpression(["'", bag, "' != ''"])),
     )
-    return LaunchDescription([*arguments, recorder, *monitors, simulator])
+    return LaunchDescription([*arguments, recorder, *asked_for, *monitors, simulator])

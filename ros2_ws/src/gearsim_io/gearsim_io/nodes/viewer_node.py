@@ -30,7 +30,7 @@ except ImportError:
 LIVE_CHUNK_ROWS = 512
 FLUSH_S = 1.0
 END_S = 5.0
-SOURCES = ("envelope", "kurtosis")
+SOURCES = ("envelope", "kurtosis", "gear", "trend")
 
 
 @dataclass(frozen=True)
