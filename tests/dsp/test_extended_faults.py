@@ -67,7 +67,7 @@ def test_the_enhanced_envelope_names_the_race(rig):
     signals, rate, bpfo = rig
     found = {}
     for name, x in signals.items():
-        spectrum = cyclic_spectrum(random_part(x), rate, 256.0, 300.0)
+        spectrum = cyclic_spectrum(random_part(x), rate, 256.0, 300.0).coherence_map()
         found[name] = enhanced_envelope_spectrum(spectrum, (512.0, 6000.0))
     assert found["inner"].line(SHAFT_HZ).false_alarm < 1e-6
     comb = found["outer"].comb(bpfo, 0.02)
@@ -88,8 +88,8 @@ def test_without_slip_an_outer_race_repeats_and_is_taken_for_a_gear(rig):
     outer = replace(rough, params={**rough.params, "race": "outer", "row": 1})
     record = to_record(replace(base, faults=(outer,)), SECONDS)
     x = record.data[record.channels.index("b3_y")].astype(np.float64)
-    spectrum = cyclic_spectrum(random_part(x), rate, 256.0, 300.0)
+    spectrum = cyclic_spectrum(random_part(x), rate, 256.0, 300.0).coherence_map()
     firm = enhanced_envelope_spectrum(spectrum, (512.0, 6000.0)).comb(bpfo, 0.02)
-    slipping = cyclic_spectrum(random_part(signals["outer"]), rate, 256.0, 300.0)
+    slipping = cyclic_spectrum(random_part(signals["outer"]), rate, 256.0, 300.0).coherence_map()
     loose = enhanced_envelope_spectrum(slipping, (512.0, 6000.0)).comb(bpfo, 0.02)
     assert firm.modulation < 0.1 * loose.modulation

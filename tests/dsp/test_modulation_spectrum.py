@@ -61,7 +61,7 @@ def noise_tests():
         found["averages"].append(np.var(ratio) / np.mean(ratio) ** 2 * averaged.averages)
         found["averaged"].append(averaged.comb(at, 0.02).false_alarm)
         if number % 4 < 2:
-            coherence = cyclic_spectrum(x, RATE, 64.0, 500.0)
+            coherence = cyclic_spectrum(x, RATE, 64.0, 500.0).coherence_map()
             found["enhanced"].append(enhanced_envelope_spectrum(coherence).comb(at, 0.02).false_alarm)
             found["best"].append(best_band(coherence, at, 0.02)[1].false_alarm)
     return {name: np.array(values) for name, values in found.items()}
@@ -174,7 +174,7 @@ def test_the_enhanced_spectrum_hears_a_weak_resonance_beside_a_loud_stationary_o
     loud = lfilter([1.0], [1.0, -2 * radius * np.cos(omega), radius**2], rng.standard_normal(x.size))
     x = x + 9 * loud / np.std(loud)
     whole = squared_envelope_spectrum(x, RATE, (300.0, 3900.0), 300.0).comb(48.9, 0.02)
-    spectrum = cyclic_spectrum(x, RATE, 64.0, 300.0)
+    spectrum = cyclic_spectrum(x, RATE, 64.0, 300.0).coherence_map()
     enhanced = enhanced_envelope_spectrum(spectrum)
     comb = enhanced.comb(48.9, 0.02)
     assert whole.false_alarm > 1e-3
@@ -196,7 +196,7 @@ def test_the_enhanced_spectrum_hears_a_weak_resonance_beside_a_loud_stationary_o
 
 def test_coherence_of_stationary_noise_has_its_mean():
     x = np.random.default_rng(8).standard_normal(round(8 * RATE))
-    spectrum = cyclic_spectrum(x, RATE, 64.0, 300.0)
+    spectrum = cyclic_spectrum(x, RATE, 64.0, 300.0).coherence_map()
     assert np.mean(enhanced_envelope_spectrum(spectrum).power[20:]) == pytest.approx(
         1 / spectrum.averages, rel=0.03
     )
@@ -218,7 +218,7 @@ def test_coherence_of_stationary_noise_has_its_mean():
 def test_measured_faults(record_file, name, machine, shaft_hz, expected_hz, found_hz):
     record = import_file(record_file(name), machine)
     rate, x = record.sample_rate_hz, record.data[0]
-    spectrum = cyclic_spectrum(x, rate, rate / 256, 5 * expected_hz)
+    spectrum = cyclic_spectrum(x, rate, rate / 256, 5 * expected_hz).coherence_map()
     trusted = (0.03 * rate, 0.46 * rate)
     enhanced = enhanced_envelope_spectrum(spectrum, trusted).comb(expected_hz, 0.015, shafts=(shaft_hz,))
     improved, comb = best_band(spectrum, expected_hz, 0.015, shafts=(shaft_hz,), band_hz=trusted)
@@ -265,5 +265,6 @@ def test_what_is_asked_of_a_spectrum_is_checked():
     with pytest.raises(InputError, match="a finite vector"):
         ModulationSpectrum(power * np.nan, 0.5, "Hz", 1.0, BAND, "SES")
     coherence = cyclic_spectrum(np.random.default_rng(0).standard_normal(9000), RATE, 64.0, 100.0)
+    coherence = coherence.coherence_map()
     with pytest.raises(InputError, match="at most 99"):
         carrier_profile(coherence, 150.0)

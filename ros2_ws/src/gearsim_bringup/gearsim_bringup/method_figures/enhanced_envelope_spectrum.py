@@ -27,9 +27,9 @@ def draw(records: Measured) -> Figure:
     (family,) = (f for f in fault_families(records.machine(RECORD)) if f.fault == "outer_race")
     expected_hz = family.order * SHAFT_HZ
     trusted = (0.03 * rate_hz, 0.46 * rate_hz)
-    spectrum = cyclic_spectrum(signal, rate_hz, rate_hz / 256, TOP_HZ + 20)
-    enhanced = enhanced_envelope_spectrum(spectrum, trusted)
-    improved, comb = best_band(spectrum, expected_hz, TOLERANCE, shafts=(SHAFT_HZ,), band_hz=trusted)
+    coherence = cyclic_spectrum(signal, rate_hz, rate_hz / 256, TOP_HZ + 20).coherence_map()
+    enhanced = enhanced_envelope_spectrum(coherence, trusted)
+    improved, comb = best_band(coherence, expected_hz, TOLERANCE, shafts=(SHAFT_HZ,), band_hz=trusted)
     squared = squared_envelope_spectrum(signal, rate_hz, trusted, TOP_HZ + 20)
     figure = new_figure(
         "probability of every line as noise (cut at 1e-26): outer-race fault, MFPT at 25 lb", 6.0
@@ -53,8 +53,8 @@ def draw(records: Measured) -> Figure:
         for k in (1, 2, 3, 4, 5):
             mark(axes, k * comb.found, f"{k} BPFO" if kind == "SES" else "")
     grid["IES"].set_xlabel("cyclic frequency [Hz]")
-    profile = carrier_profile(spectrum, comb.found)
-    grid["profile"].plot(np.maximum(profile, 0.0), spectrum.frequency_hz / 1e3, color=FAULTY, linewidth=1.0)
+    profile = carrier_profile(coherence, comb.found)
+    grid["profile"].plot(np.maximum(profile, 0.0), coherence.frequency_hz / 1e3, color=FAULTY, linewidth=1.0)
     grid["profile"].axhspan(*(edge / 1e3 for edge in improved.band_hz), color=FAULTY, alpha=0.15)
     grid["profile"].set_xlabel("sum of |coherence|²")
     grid["profile"].set_ylabel("carrier [kHz]")

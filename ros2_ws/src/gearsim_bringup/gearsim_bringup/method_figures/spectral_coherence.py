@@ -20,14 +20,14 @@ _COLUMNS = 800
 def draw(records: Measured) -> Figure:
     """Squared coherence where it is above chance, and its mean over the carriers."""
     signal, rate_hz = records.signal(RECORD)
-    spectrum = cyclic_spectrum(signal, rate_hz, RESOLUTION_HZ, TOP_HZ)
-    squared = spectrum.squared_coherence()
+    coherence = cyclic_spectrum(signal, rate_hz, RESOLUTION_HZ, TOP_HZ).coherence_map()
+    squared = coherence.values
     figure = new_figure(f"cyclic coherence, MFPT inner-race fault, bins of {RESOLUTION_HZ:g} Hz", 5.4)
     plane, mean = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     per_column = squared.shape[1] // _COLUMNS
     shown = squared[:, : _COLUMNS * per_column].reshape(squared.shape[0], _COLUMNS, per_column).max(axis=2)
-    chance = spectrum.threshold(1e-3 / per_column)
-    extent = (0.0, _COLUMNS * per_column * spectrum.alpha_step, 0.0, rate_hz / 2e3)
+    chance = coherence.threshold(1e-3 / per_column)
+    extent = (0.0, _COLUMNS * per_column * coherence.alpha_step, 0.0, rate_hz / 2e3)
     image = plane.imshow(
         np.where(shown > chance, shown, np.nan),
         origin="lower",
@@ -41,7 +41,7 @@ def draw(records: Measured) -> Figure:
     figure.colorbar(image, ax=plane, label="|coherence|² above chance", pad=0.01)
     plane.set_ylabel("carrier [kHz]")
     plane.grid(False)
-    enhanced = enhanced_envelope_spectrum(spectrum, (0.03 * rate_hz, 0.46 * rate_hz))
+    enhanced = enhanced_envelope_spectrum(coherence, (0.03 * rate_hz, 0.46 * rate_hz))
     mean.plot(enhanced.axis, enhanced.power, color=FAULTY, linewidth=0.8, label="mean over carriers (EES)")
     mean.plot(enhanced.axis, enhanced.floor, color=GREY, linewidth=1.0, label="floor of the noise")
     mean.set_yscale("log")

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft as sfft
 
+from gearsim_dsp.cyclic.coherence import CoherenceMap
 from gearsim_dsp.speed import Phase
 from gearsim_io.errors import InputError
 
@@ -100,27 +101,18 @@ class CyclicSpectrum:
         product = self.power[:, np.newaxis] * self.shifted_power
         return np.asarray(np.divide(1.0, product, out=np.zeros_like(product), where=product > 0))
 
-    def bins(self, low_hz: float, high_hz: float) -> slice:
-        """The bins whose centres lie in [low_hz, high_hz).
-
-        Raises
-        ------
-        InputError
-            When there is none.
-        """
-        first, last = (int(np.ceil(edge / self.resolution_hz - 0.5)) for edge in (low_hz, high_hz))
-        first, last = max(first, 0), min(last, self.correlation.shape[0])
-        if not first < last:
-            top = self.correlation.shape[0] * self.resolution_hz
-            expected = f"a band inside 0..{top:g} Hz that holds a bin of {self.resolution_hz:g} Hz"
-            raise InputError("CyclicSpectrum", "band_hz", (low_hz, high_hz), expected)
-        return slice(first, last)
-
-    def threshold(self, false_alarm: float) -> float:
-        """The |g|^2 that one value of stationary Gaussian noise exceeds with that probability."""
-        if not 0 < false_alarm < 1:
-            raise InputError("CyclicSpectrum", "false_alarm", false_alarm, "a probability between 0 and 1")
-        return float(-np.expm1(np.log(false_alarm) / (self.averages - 1.0)))
+    def coherence_map(self) -> CoherenceMap:
+        """The squared coherence with its law under noise, for envelope spectra."""
+        reached = self.shifted_power[:, -1] > 0
+        first = int(np.argmax(reached)) + 1 if np.any(reached) else reached.size - 1
+        return CoherenceMap(
+            self.squared_coherence(),
+            self.resolution_hz,
+            self.alpha_step,
+            self.alpha_unit,
+            self.averages,
+            min(first, reached.size - 1),
+        )
 
 
 def cyclic_spectrum(
@@ -129,6 +121,8 @@ def cyclic_spectrum(
     resolution_hz: float,
     highest_alpha: float,
     phase: Phase | None = None,
+    *,
+    order_step: float | None = None,
 ) -> CyclicSpectrum:
     """Spectral correlation up to a highest cyclic frequency.
 
@@ -144,6 +138,9 @@ def cyclic_spectrum(
         In Hz or, with `phase`, in orders of the shaft.
     phase : Phase, optional
         Angle of the shaft over all samples.
+    order_step : float, optional
+        With `phase`, the distance of columns wanted, one over a whole number, so that records of different
+        speed share the axis; at most half the resolution, which is the default.
 
     Returns
     -------
@@ -158,7 +155,7 @@ def cyclic_spectrum(
     """
     x = _checked(samples, sample_rate_hz, resolution_hz)
     turns = None if phase is None else _turns(phase, x.size)
-    fastest = 1.0 if turns is None else float(np.max(np.diff(turns))) * sample_rate_hz
+    fastest = 1.0 if turns is None else _fastest(turns) * sample_rate_hz
     top = 0.5 * sample_rate_hz - resolution_hz
     if not 0 < highest_alpha * fastest <= top:
         expected = f"above 0 and at most {top / fastest:g} at this rate, resolution and speed"
@@ -175,9 +172,9 @@ def cyclic_spectrum(
         step = shift_hz = sample_rate_hz / plan.padded
         correlation = _correlate(lines, plan, int(highest_alpha / step + 1e-9) + 1)
     else:
-        step = 1.0 / (_PADDING * span)
-        shift_hz = sample_rate_hz / (_PADDING * x.size)  # the mean speed times the step
-        correlation = _correlate_in_angle(lines, plan, turns, int(highest_alpha / step + 1e-9) + 1)
+        step = _order_step(span, order_step)
+        shift_hz = step * span / x.size * sample_rate_hz  # at the mean speed
+        correlation = _correlate_in_angle(lines, plan, turns, step, int(highest_alpha / step + 1e-9) + 1)
     shifts = np.round(np.arange(correlation.shape[1]) * shift_hz * plan.padded / sample_rate_hz)
     return CyclicSpectrum(
         correlation * scale,
@@ -240,6 +237,22 @@ def _turns(phase: Phase, samples: int) -> NDArray[np.float64]:
     return np.asarray(np.interp(np.arange(samples), phase.samples, phase.turns))
 
 
+def _fastest(turns: NDArray[np.float64]) -> float:
+    """Highest turns per sample over hundredths of the record, which an encoder's jitter does not raise."""
+    stretch = max(1, turns.size // 100)
+    return 1.02 * float(np.max(np.diff(turns[::stretch]))) / stretch
+
+
+def _order_step(span: float, wanted: float | None) -> float:
+    if wanted is None:
+        return 1.0 / sfft.next_fast_len(int(np.ceil(_PADDING * span)))
+    lines = round(1.0 / wanted) if wanted > 0 else 0
+    if lines < _PADDING * span or abs(lines * wanted - 1) > 1e-9:
+        expected = f"one over a whole number, at most {1 / (_PADDING * span):.4g}"
+        raise InputError("cyclic_spectrum", "order_step", wanted, expected)
+    return wanted
+
+
 def _lines(x: Samples, padded: int) -> NDArray[np.complexfloating]:
     """Lines of the signal under a sine taper, whose square, Hann's window, shapes the lines over alpha."""
     taper = np.sin(np.pi * (np.arange(x.size) + 0.5) / x.size)
@@ -275,24 +288,25 @@ def _correlate(lines: NDArray[np.complexfloating], plan: _Plan, alphas: int) -> 
 
 
 def _correlate_in_angle(
-    lines: NDArray[np.complexfloating], plan: _Plan, turns: NDArray[np.float64], alphas: int
+    lines: NDArray[np.complexfloating], plan: _Plan, turns: NDArray[np.float64], step: float, alphas: int
 ) -> NDArray[np.complexfloating]:
     """As `_correlate`, with the product resampled at equal angles (cubic, from four times its bandwidth)."""
     length = int(sfft.next_fast_len(_OVERSAMPLING * plan.length))
     stride = plan.padded / length
-    points = int(sfft.next_fast_len(int(np.ceil(plan.samples / stride))))
-    angles = turns[0] + (turns[-1] - turns[0]) * (np.arange(points) + 0.5) / points
-    at = np.interp(angles, turns, np.arange(turns.size)) / stride
+    span = float(turns[-1] - turns[0])
+    per_turn = sfft.next_fast_len(int(np.ceil(plan.samples / stride / span)))
+    angles = (np.arange(int(span * per_turn)) + 0.5) / per_turn
+    at = np.interp(turns[0] + angles, turns, np.arange(turns.size)) / stride
     left = np.maximum(at.astype(np.intp), 1)
     taps = _cubic(at - left).astype(lines.real.dtype)
     out = np.empty((plan.bins, alphas), dtype=lines.dtype)
-    share = lines.real.dtype.type(plan.samples / plan.padded / points)
+    share = plan.samples / plan.padded / angles.size
     # The grid begins half a step late, which turns the phase of every cyclic frequency.
-    turn = np.exp(-1j * np.pi * np.arange(alphas) / (_PADDING * points)).astype(lines.dtype) * share
+    turn = (share * np.exp(-1j * np.pi * step / per_turn * np.arange(alphas))).astype(lines.dtype)
     for chosen in plan.batches(length):
         product = _rows(lines, plan, chosen, length)
         resampled = sum(tap * product[:, left + k] for k, tap in enumerate(taps, start=-1))
-        out[chosen] = sfft.fft(resampled, n=_PADDING * points, axis=1)[:, :alphas] * turn
+        out[chosen] = sfft.fft(resampled, n=round(per_turn / step), axis=1)[:, :alphas] * turn
     return out
 
 

@@ -9,7 +9,7 @@ that carry the modulation sought the improved one (IES)::
 (Antoni, Xin and Hamzaoui, Mech. Syst. Signal Process. 92 (2017) 248-277; Abboud, Elbadaoui, Smith and
 Randall, ibid. 114 (2019) 43-60; Mauricio, Smith, Randall, Antoni and Gryllias, ibid. 144 (2020) 106891).
 Authors average |g| or |g|^2; here it is |g|^2, of which the law under noise is known: 1 / averages in the
-mean, and a Gamma distribution with one degree per bin.
+mean, and a Gamma distribution with one degree per bin and window.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_dsp.cyclic.correlation import CyclicSpectrum
+from gearsim_dsp.cyclic.coherence import CoherenceMap
 from gearsim_dsp.cyclic.modulation import CombTest, ModulationSpectrum
 from gearsim_io.errors import InputError
 
@@ -28,13 +28,14 @@ _LEAST_BINS = 2
 
 
 def enhanced_envelope_spectrum(
-    spectrum: CyclicSpectrum, band_hz: tuple[float, float] | None = None
+    coherence: CoherenceMap, band_hz: tuple[float, float] | None = None
 ) -> ModulationSpectrum:
     """Squared coherence averaged over all carriers above the highest cyclic frequency.
 
     Parameters
     ----------
-    spectrum : CyclicSpectrum
+    coherence : CoherenceMap
+        As `CyclicSpectrum.coherence_map` or `averaged_coherence` give it.
     band_hz : tuple of float, optional
         Where the record is trusted, such as below an anti-alias filter. Default: from the highest cyclic
         frequency to the top.
@@ -44,23 +45,22 @@ def enhanced_envelope_spectrum(
     ModulationSpectrum
         Of kind "EES".
     """
-    low_hz, high_hz = band_hz or _all(spectrum)
-    return _averaged(spectrum, spectrum.bins(low_hz, high_hz), "EES", 1)
+    return _averaged(coherence, coherence.bins(band_hz), "EES")
 
 
-def improved_envelope_spectrum(spectrum: CyclicSpectrum, band_hz: tuple[float, float]) -> ModulationSpectrum:
-    """Squared coherence averaged over the carriers of a band that was not chosen by looking at `spectrum`.
+def improved_envelope_spectrum(coherence: CoherenceMap, band_hz: tuple[float, float]) -> ModulationSpectrum:
+    """Squared coherence averaged over the carriers of a band that was not chosen by looking at `coherence`.
 
     Returns
     -------
     ModulationSpectrum
         Of kind "IES".
     """
-    return _averaged(spectrum, spectrum.bins(*band_hz), "IES", 1)
+    return _averaged(coherence, coherence.bins(band_hz), "IES")
 
 
 def best_band(
-    spectrum: CyclicSpectrum,
+    coherence: CoherenceMap,
     expected: float,
     tolerance: float,
     *,
@@ -77,7 +77,8 @@ def best_band(
 
     Parameters
     ----------
-    spectrum : CyclicSpectrum
+    coherence : CoherenceMap
+        As `CyclicSpectrum.coherence_map` or `averaged_coherence` give it.
     expected, tolerance, sideband, shafts
         The comb, as in `ModulationSpectrum.comb`.
     band_hz : tuple of float, optional
@@ -90,28 +91,28 @@ def best_band(
     comb : CombTest
         The comb in it.
     """
-    chosen = spectrum.bins(*(band_hz or _all(spectrum)))
-    bands = _tree(chosen)
-    squared = np.asarray(spectrum.squared_coherence(), dtype=np.float64)
-    below = np.vstack([np.zeros((1, squared.shape[1])), np.cumsum(squared, axis=0)])
+    bands = _tree(coherence.bins(band_hz))
+    below = np.zeros((coherence.values.shape[0] + 1, coherence.values.shape[1]))
+    np.cumsum(coherence.values, axis=0, out=below[1:])
     found = []
     for band in bands:
         power = (below[band.stop] - below[band.start]) / (band.stop - band.start)
-        candidate = _modulation(spectrum, power, band, "IES", len(bands))
+        candidate = _modulation(coherence, power, band, "IES", len(bands))
         found.append((candidate, candidate.comb(expected, tolerance, sideband, shafts)))
     return min(found, key=lambda pair: (pair[1].false_alarm, -pair[1].modulation))
 
 
 def carrier_profile(
-    spectrum: CyclicSpectrum, fundamental: float, harmonics: int = _TOP_HARMONICS
+    coherence: CoherenceMap, fundamental: float, harmonics: int = _TOP_HARMONICS
 ) -> NDArray[np.float64]:
     """Which carriers a period modulates: squared coherence at its first harmonics, less the noise's mean.
 
     Parameters
     ----------
-    spectrum : CyclicSpectrum
+    coherence : CoherenceMap
+        As `CyclicSpectrum.coherence_map` or `averaged_coherence` give it.
     fundamental : float
-        Cyclic frequency found, on the spectrum's axis; the nearest column on either side may be taken.
+        Cyclic frequency found, on the map's axis; the nearest column on either side may be taken.
     harmonics : int
         As many as the axis holds, at least one.
 
@@ -120,23 +121,15 @@ def carrier_profile(
     ndarray of float64, shape (bins,)
         Sum over the harmonics; around 0 where nothing is modulated.
     """
-    columns = [round(k * fundamental / spectrum.alpha_step) for k in range(1, harmonics + 1)]
-    columns = [column for column in columns if 1 <= column < spectrum.correlation.shape[1] - 1]
+    columns = [round(k * fundamental / coherence.alpha_step) for k in range(1, harmonics + 1)]
+    columns = [column for column in columns if 1 <= column < coherence.values.shape[1] - 1]
     if not columns:
-        top = spectrum.alpha_step * (spectrum.correlation.shape[1] - 2)
+        top = coherence.alpha_step * (coherence.values.shape[1] - 2)
         raise InputError("carrier_profile", "fundamental", fundamental, f"above 0 and at most {top:g}")
-    squared = spectrum.squared_coherence()
-    mean = squared.mean(axis=0)
+    mean = coherence.values[coherence.bins()].mean(axis=0)
     tops = [column - 1 + int(np.argmax(mean[column - 1 : column + 2])) for column in columns]
-    return np.asarray(np.sum(squared[:, tops], axis=1) - len(tops) / spectrum.averages, dtype=np.float64)
-
-
-def _all(spectrum: CyclicSpectrum) -> tuple[float, float]:
-    """Carriers with a line below them at every cyclic frequency; in orders all but the lowest are taken."""
-    reached = np.flatnonzero(spectrum.shifted_power[:, -1] > 0)
-    first = int(reached[0]) + 1 if reached.size else spectrum.correlation.shape[0]
-    low_hz = min(first, spectrum.correlation.shape[0] - 1) * spectrum.resolution_hz
-    return low_hz, spectrum.correlation.shape[0] * spectrum.resolution_hz
+    total = np.sum(coherence.values[:, tops], axis=1, dtype=np.float64)
+    return np.asarray(total - len(tops) / coherence.averages)
 
 
 def _tree(chosen: slice) -> list[slice]:
@@ -151,14 +144,14 @@ def _tree(chosen: slice) -> list[slice]:
     return [slice(first, last) for first, last in sorted(bands)]
 
 
-def _averaged(spectrum: CyclicSpectrum, band: slice, kind: str, looks: int) -> ModulationSpectrum:
-    power = np.asarray(spectrum.squared_coherence()[band].mean(axis=0), dtype=np.float64)
-    return _modulation(spectrum, power, band, kind, looks)
+def _averaged(coherence: CoherenceMap, band: slice, kind: str) -> ModulationSpectrum:
+    power = coherence.values[band].mean(axis=0, dtype=np.float64)
+    return _modulation(coherence, np.asarray(power), band, kind, 1)
 
 
 def _modulation(
-    spectrum: CyclicSpectrum, power: NDArray[np.float64], band: slice, kind: str, looks: int
+    coherence: CoherenceMap, power: NDArray[np.float64], band: slice, kind: str, looks: int
 ) -> ModulationSpectrum:
-    edges = band.start * spectrum.resolution_hz, band.stop * spectrum.resolution_hz
-    averages = float(band.stop - band.start)
-    return ModulationSpectrum(power, spectrum.alpha_step, spectrum.alpha_unit, averages, edges, kind, looks)
+    edges = band.start * coherence.resolution_hz, band.stop * coherence.resolution_hz
+    averages = (band.stop - band.start) * coherence.windows
+    return ModulationSpectrum(power, coherence.alpha_step, coherence.alpha_unit, averages, edges, kind, looks)
