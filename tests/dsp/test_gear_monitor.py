@@ -207,4 +207,5 @@ def test_memory_does_not_grow_with_the_length_of_the_stream():
     finally:
         tracemalloc.stop()
     assert len(held) == 2
-    assert held[1] - held[0] < 20_000  # half a minute of samples would be 1.9 MB
+    # Half a minute of samples would be 1.9 MB; free lists of small objects settle at some tens of kB.
+    assert held[1] - held[0] < 100_000
