@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bearing_signals import defect, noise, turns_of
-from scipy.signal import hilbert
+from scipy.signal import firwin, hilbert, lfilter
 
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.envelope import window_spectrum
@@ -80,14 +80,31 @@ def test_noise_has_no_band():
     assert sum(pair[1].band is not None for pair in chosen) <= 1
 
 
-def test_a_single_knock_does_not_win():
+@pytest.mark.parametrize(("height", "decay"), [(40.0, 15), (80.0, 15), (20.0, 100)])
+def test_a_single_knock_does_not_win(height, decay):
     """Unlike in the kurtogram, it does not even without guards."""
     x = _defect(3)
-    x[20_000:20_060] += 40 * np.sin(2 * np.pi * 2500 * np.arange(60) / RATE) * np.exp(-np.arange(60) / 15)
+    n = np.arange(4 * decay)
+    x[20_000 : 20_000 + n.size] += height * np.sin(2 * np.pi * 2500 * n / RATE) * np.exp(-n / decay)
     plain = fast_kurtogram(x, RATE, 4).strongest
     assert not plain.low_hz <= 7000 <= plain.high_hz
-    band = max(autogram(x, RATE, 4, 0.002).bands[1:], key=lambda b: b.value)
-    assert band.low_hz <= 7000 <= band.high_hz
+    band = max(autogram(x, RATE, 4).bands, key=lambda b: b.value)
+    assert 4500 < band.low_hz <= 7000 <= band.high_hz
+    for choice in _choices(x):
+        assert 4500 < choice.band.low_hz - 500 <= 7000 <= choice.band.high_hz + 500
+
+
+def test_what_repeats_beyond_the_rolloff_does_not_win():
+    """Quanta of a converter at nearly regular intervals, above the anti-alias filter."""
+    x = lfilter(firwin(201, 0.86), 1.0, _defect(5))
+    crumbs = np.zeros(x.size)
+    crumbs[np.cumsum(np.random.default_rng(6).normal(240, 1.5, 195)).astype(int)] = 1.0
+    x = x + lfilter(firwin(201, 0.92, pass_zero=False), 1.0, crumbs)
+    plain = max(protrugram(x, RATE, 400.0).bands, key=lambda b: b.value)
+    assert plain.low_hz > 10_500
+    by_autogram, by_protrugram = _choices(x)
+    assert max(by_autogram.band.high_hz, by_protrugram.band.high_hz) < 0.5 * 0.9 * RATE
+    assert any("rolled off" in text for text in by_protrugram.rejected)
 
 
 def test_beating_lines_do_not_win():

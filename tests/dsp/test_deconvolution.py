@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from bearing_signals import noise
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from gearsim_dsp.features import kurtosis
 from gearsim_dsp.separation.deconvolution import armed, correlated_kurtosis, mckd, med
+from gearsim_dsp.separation.linear_prediction import ar_residual, best_ar_length
 from gearsim_io.errors import InputError
 
 N = 20_000
@@ -20,10 +22,10 @@ def behind_a_path(impacts, rng, level=0.05):
 
 @pytest.fixture(scope="module")
 def train():
-    """Impacts with random distances, as of a bearing with slip."""
+    """Impacts of either sign with random distances, as of a bearing with slip."""
     rng = np.random.default_rng(0)
     impacts = np.zeros(N)
-    impacts[np.cumsum(rng.integers(180, 220, 90))] = rng.uniform(0.8, 1.2, 90)
+    impacts[np.cumsum(rng.integers(180, 220, 90))] = rng.uniform(0.8, 1.2, 90) * rng.choice([-1, 1], 90)
     return impacts, behind_a_path(impacts, rng)
 
 
@@ -41,21 +43,19 @@ def test_med_undoes_the_path(train):
 
 
 def test_the_end_of_the_iteration_is_a_maximum(train):
-    """Small random changes of the filter lower the kurtosis, and those along it change nothing."""
+    """scipy's search finds nothing better nearby; the iteration ends when it gains less than 1e-4."""
     _, x = train
-    found = med(x, 20, iterations=300)
+    found = med(x, 6, iterations=500)  # too short to undo the path, so other aims lead elsewhere
 
     def value(taps):
         y = np.convolve(x - x.mean(), taps, "valid")
         return y.size * np.sum(y**4) / np.sum(y**2) ** 2
 
     top = value(found.taps)
-    assert top == pytest.approx(max(found.history), rel=1e-9)
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        step = 0.02 * rng.standard_normal(20)
-        assert value(found.taps + step) < top * (1 + 1e-4)
+    assert top == pytest.approx(found.history[-1], rel=1e-9)
     assert value(3.0 * found.taps) == pytest.approx(top)
+    best = minimize(lambda taps: -value(taps), found.taps, method="BFGS")
+    assert -best.fun < top * (1 + 1e-3)
 
 
 def test_correlated_kurtosis_equals_pysdkit(train):
@@ -113,6 +113,9 @@ def test_armed_takes_gears_away_first():
     x = behind_a_path(impacts, rng) + gears
     found = armed(x, 50, 40)
     assert found.values.shape == x.shape
+    ar = best_ar_length(x, 50)
+    np.testing.assert_array_equal(found.values[ar:], med(ar_residual(x, ar)[ar:], 40).values)
+    assert np.all(found.values[: ar + 39] == 0)
     assert kurtosis(found.values) > 20 > 5 * kurtosis(x)
 
 

@@ -19,7 +19,7 @@ def draw(records: Measured) -> Figure:
     figure = new_figure("autogram, MFPT outer race, 100 lb: chosen under guards (red)", 4.0)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1))
     signal, rate_hz = records.signal(RECORD)
-    bands = autogram(signal, rate_hz, LEVELS, 0.5 / (4 * BPFO_HZ)).bands
+    bands = autogram(signal, rate_hz, LEVELS).bands
     draw_map(left, ((b.level, b.low_hz, b.high_hz, b.value) for b in bands), "V")
     band = choose_by_autogram(signal, rate_hz, 4 * BPFO_HZ, np.random.default_rng(1)).band
     assert band is not None

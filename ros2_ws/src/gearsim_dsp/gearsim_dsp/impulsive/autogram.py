@@ -8,8 +8,8 @@ values over the lags
 is taken, which is large where R has narrow peaks at multiples of a period (Moshrefzadeh and Fasana, Mech.
 Syst. Signal Process. 105 (2018) 294-318). A single knock has no second peak, so it does not win as it does in
 the kurtogram. Three things differ from the paper: the bands are cut out of one FFT (its wavelet packets
-overlap their neighbours); short lags are left out, where every signal correlates with itself and a knock
-with its own ringing; and the squared envelope is limited to its 99th percentile, so that a knock weighs no
+overlap their neighbours); lags shorter than a band's own memory are left out, where every signal correlates
+with itself; and the squared envelope is limited to its 99th percentile, so that a knock weighs no
 more than any other moment in which the signal is loud.
 """
 
@@ -39,7 +39,6 @@ def autogram(
     samples: NDArray[np.float32] | NDArray[np.float64],
     sample_rate_hz: float,
     levels: int = 6,
-    least_lag_s: float = 0.0,
 ) -> BandMap:
     """V of every band of a binary tree.
 
@@ -50,9 +49,6 @@ def autogram(
     sample_rate_hz : float
     levels : int
         The narrowest bands are sample_rate / 2^(levels + 1) wide.
-    least_lag_s : float
-        Shortest lag that counts, and at least four over the band's width: half the shortest distance of
-        impacts looked for.
 
     Raises
     ------
@@ -63,10 +59,7 @@ def autogram(
     levels = checked_count(where, "levels", levels, 1)
     least = max(_LEAST_SAMPLES, 2 * _LEAST_LINES << levels)
     x = checked_signal(where, samples, least, f"{levels} levels")
-    if not 0.0 <= least_lag_s <= 0.25 * x.size / sample_rate_hz:
-        expected = f"0 to {0.25 * x.size / sample_rate_hz:g}, a quarter of the signal"
-        raise InputError(where, "least_lag_s", least_lag_s, expected)
-    return _autogram(window_spectrum(x, sample_rate_hz), levels, least_lag_s)
+    return _autogram(window_spectrum(x, sample_rate_hz), levels)
 
 
 def choose_by_autogram(
@@ -93,11 +86,10 @@ def choose_by_autogram(
         raise InputError(where, "least_width_hz", least_width_hz, f"0 to {0.5 * sample_rate_hz:g} Hz")
     levels = min(levels_for(least_width_hz, sample_rate_hz), int(np.log2(x.size / (2 * _LEAST_LINES))))
     spectrum = window_spectrum(x, sample_rate_hz)
-    least_lag_s = min(1.0 / least_width_hz, 0.25 * x.size / sample_rate_hz)
-    return choose_from(lambda lines: _autogram(lines, levels, least_lag_s), spectrum, x, least_width_hz, rng)
+    return choose_from(lambda lines: _autogram(lines, levels), spectrum, x, least_width_hz, rng)
 
 
-def _autogram(spectrum: WindowSpectrum, levels: int, least_lag_s: float) -> BandMap:
+def _autogram(spectrum: WindowSpectrum, levels: int) -> BandMap:
     top_hz = 0.5 * spectrum.sample_rate_hz
     bands: list[BandValue] = []
     for level in range(levels + 1):
@@ -107,7 +99,7 @@ def _autogram(spectrum: WindowSpectrum, levels: int, least_lag_s: float) -> Band
         lows_hz = width_hz * np.arange(count)
         inner = np.maximum(lows_hz, spectrum.step_hz)
         envelopes = squared_envelopes(spectrum, inner, width_hz - 2 * spectrum.step_hz)
-        first_lag = envelopes.rate_hz * max(_OWN_MEMORY / width_hz, least_lag_s)
+        first_lag = envelopes.rate_hz * _OWN_MEMORY / width_hz
         sharpness = _sharpness(envelopes.values, first_lag)
         power = envelopes.values.mean(axis=1, dtype=np.float64)
         bands += [

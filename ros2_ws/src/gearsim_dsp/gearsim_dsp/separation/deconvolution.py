@@ -196,20 +196,17 @@ def _iterated(
     taps[length // 2] = 1.0
     y = record.filtered(taps)
     slope, value = gradient(y / np.max(np.abs(y)))
-    best, history, converged = taps, [value], False
+    history, converged = [value], False
     for _ in range(iterations):
         taps = record.solved(slope)
         y = record.filtered(taps)
         slope, value = gradient(y / np.max(np.abs(y)))
-        if value > max(history):
-            best = taps
         converged = abs(value - history[-1]) <= _ENOUGH * value
         history.append(value)
         if converged:
             break
-    y = record.filtered(best)
     values = np.concatenate((np.zeros(length - 1), y * (scale / np.sqrt(np.mean(y * y)))))
-    return Deconvolution(best, values, tuple(history), converged)
+    return Deconvolution(taps, values, tuple(history), converged)
 
 
 class _Record:
