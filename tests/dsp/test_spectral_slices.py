@@ -5,6 +5,7 @@ from scipy.signal import lfilter, welch
 from gearsim_dsp.cyclic.slices import gain_db, slices_before_and_after, spectral_slices
 from gearsim_dsp.separation.random_separation import drs
 from gearsim_io.errors import InputError
+from gearsim_io.importers import import_file
 
 RATE = 8192.0
 
@@ -117,3 +118,25 @@ def test_what_is_asked_of_slices_is_checked():
         slices.chance_db(1.0)
     with pytest.raises(InputError, match="remove"):
         slices_before_and_after(x, RATE, [0.0], 64.0, lambda x: x[:-1])
+
+
+@pytest.mark.records
+def test_a_measured_wide_defect_stands_out_at_its_ball_passes(record_file):
+    """HIT-SM, a defect of 8 degrees on the outer race against a sound bearing, each by its own coherence."""
+    shares = {}
+    for name in ("SQ_OR8_600", "SQ_Normal_600"):
+        record = import_file(record_file(f"hit_sm/{name}.mat"), "hit_sq")
+        length = round(record.sample_rate_hz / 8) * 2
+        pair = slices_before_and_after(
+            record.data[0],
+            record.sample_rate_hz,
+            [0.0, 35.98],
+            100.0,
+            lambda x, n=length: drs(x, n // 8, n)[1],
+        )
+        low = (pair.after.frequency_hz > 500) & (pair.after.frequency_hz < 10_000)
+        shares[name] = np.mean(pair.after.level_db()[1, low] > pair.after.chance_db()[1, low])
+        removed = pair.removed_share
+    assert shares["SQ_OR8_600"] > 0.95
+    assert shares["SQ_Normal_600"] < 0.15
+    assert removed > 0.9  # the sound record is nearly all inverter
