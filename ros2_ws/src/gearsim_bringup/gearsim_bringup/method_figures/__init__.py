@@ -10,8 +10,11 @@ FIGURES: tuple[str, ...] = (
     "deconvolution",
     "discrete_random_separation",
     "enhanced_envelope_spectrum",
+    "gear_indicators",
+    "gear_kinematics",
     "kurtogram",
     "linear_prediction",
+    "mesh_demodulation",
     "planet_separation",
     "protrugram",
     "scf_slices",
@@ -19,4 +22,5 @@ FIGURES: tuple[str, ...] = (
     "spectral_coherence",
     "spectral_kurtosis",
     "squared_envelope_spectrum",
+    "synchronous_average",
 )
