@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+from bearing_signals import turns_of
 from scipy.signal import lfilter, welch
 
+from gearsim_dsp.angle.resample import to_angle
 from gearsim_dsp.cyclic.slices import gain_db, slices_before_and_after, spectral_slices
 from gearsim_dsp.separation.random_separation import drs
+from gearsim_dsp.speed import Phase
 from gearsim_io.errors import InputError
 from gearsim_io.importers import import_file
 
@@ -86,6 +89,23 @@ def test_a_wrong_cyclic_frequency_reads_low():
     x = rough_bearing_beside_gears(0.1) - rough_bearing_beside_gears(0.0)
     slices = spectral_slices(x, RATE, [10.0, 10.2], 64.0)
     assert slices.mean_level(0, 200, 3900) > 5 * slices.mean_level(1, 200, 3900)
+
+
+def test_at_changing_speed_slices_are_taken_over_angle():
+    """Speed up by 10 %: once per turn stays one order, while in Hz it is spread."""
+    turns = turns_of(np.array([9.5, 10.5]), 12.0, RATE)
+    rng = np.random.default_rng(5)
+    load = np.maximum(0.0, np.cos(2 * np.pi * turns)) ** 1.5
+    x = (0.2 + load) * rng.standard_normal(turns.size)
+    phase = Phase(np.arange(0, turns.size, 64, dtype=float), turns[::64])
+    angle = to_angle(x, phase, 1024)
+    orders = spectral_slices(angle.values, 1024.0, [1.0], 8.0)
+    hz = spectral_slices(x, RATE, [10.0], 80.0)
+    inside = slice(4, 40)  # below the lowest cut-off of the resampling filter
+    sharp = np.mean(orders.squared_coherence()[0, inside])
+    assert sharp > 0.4
+    # a sweep of 1 Hz over 12 s spreads its power over 12 resolutions
+    assert np.mean(hz.squared_coherence()[0, inside]) < sharp / 6
 
 
 @pytest.mark.parametrize(

@@ -83,8 +83,8 @@ def window_spectrum(
 def suppress_lines(spectrum: WindowSpectrum, limit: float = _LINE_LIMIT) -> WindowSpectrum:
     """The spectrum with every line limited to `limit` times the median magnitude of its neighbourhood.
 
-    The neighbourhood is 128 lines wide. Of Gaussian noise a share of 2^-(limit^2) of the lines is touched
-    (0.2 % at the default of 3). Phases stay, so impulses keep their shape in time.
+    The neighbourhood is 128 lines wide. Of Gaussian noise a share of 2^-(limit^2) of the lines is touched:
+    none at the default of 10, 0.2 % at 3. Phases stay, so impulses keep their shape in time.
     """
     magnitude = np.abs(spectrum.lines)
     local = _local_median(magnitude)
