@@ -223,6 +223,8 @@ def _checked(samples: Samples, rate_hz: float, resolution_hz: float) -> Samples:
     x = samples if samples.dtype in (np.float32, np.float64) else samples.astype(np.float64)
     if x.ndim != 1 or not np.all(np.isfinite(x)):
         raise InputError("cyclic_spectrum", "samples", f"shape {x.shape}", "a vector of finite values")
+    if x.size == 0 or np.ptp(x) == 0:
+        raise InputError("cyclic_spectrum", "samples", "a constant", "a signal that varies")
     least_s = _LEAST_AVERAGES * TAPER_LOSS / resolution_hz
     if x.size < least_s * rate_hz:
         expected = f"at least {least_s:.3g} s at a resolution of {resolution_hz:g} Hz"

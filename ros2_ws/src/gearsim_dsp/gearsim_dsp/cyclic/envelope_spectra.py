@@ -28,8 +28,8 @@ from gearsim_io.errors import InputError
 
 __all__ = ["squared_envelope_spectrum"]
 
-_LEAST_PERIODS = 8.0
 _LEAST_TOP_LINES = 32
+_ROUNDING = 2e-7  # of the greatest sample: what single precision leaves of a constant
 
 
 def squared_envelope_spectrum(
@@ -87,6 +87,7 @@ def squared_envelope_spectrum(
     starts = np.arange(0, x.size - length + 1, max(1, length // 2), dtype=np.int64)
     spectra = (window_spectrum(x[start : start + length], sample_rate_hz) for start in starts)
     envelopes = [_envelopes(spectrum, band_hz, limit_lines) for spectrum in spectra]
+    _check_level(envelopes, float(np.max(np.abs(x))), band_hz)
     power, step = _over_frequency(envelopes) if turns is None else _over_orders(envelopes, starts, turns, top)
     lines = min(power.size, int(top / step) + 2)
     kept = envelopes[0].values.shape[1] * envelopes[0].stride  # the tapered ends are cut off
@@ -103,6 +104,15 @@ def squared_envelope_spectrum(
 def _envelopes(spectrum: WindowSpectrum, band_hz: tuple[float, float], limit_lines: bool) -> Envelopes:
     clean = suppress_lines(spectrum) if limit_lines else spectrum
     return squared_envelopes(clean, np.array([band_hz[0]]), band_hz[1] - band_hz[0])
+
+
+def _check_level(envelopes: list[Envelopes], peak: float, band_hz: tuple[float, float]) -> None:
+    """A band that holds the rounding of the FFT alone has an envelope, but none that means anything."""
+    level = min(float(one.values.mean(dtype=np.float64)) for one in envelopes)
+    if level <= (_ROUNDING * peak) ** 2:
+        found = f"rms {level**0.5:.2g} in {band_hz[0]:g} to {band_hz[1]:g} Hz"
+        expected = f"a signal in that band, above {_ROUNDING * peak:.2g}"
+        raise InputError("squared_envelope_spectrum", "samples", found, expected)
 
 
 def _over_frequency(envelopes: list[Envelopes]) -> tuple[NDArray[np.float64], float]:
