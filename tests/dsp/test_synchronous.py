@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal, stats
 
 from gearsim_dsp.angle.resample import AngleSignal
 from gearsim_dsp.features import rms
@@ -184,6 +185,13 @@ def test_indicators_of_noise_and_of_a_sine():
     assert (fm4(sine), m6a(sine), m8a(sine)) == pytest.approx((1.5, 2.5, 4.375))
 
 
+def test_moments_are_those_of_scipy():
+    x = np.random.default_rng(5).gamma(2.0, size=5000)
+    assert fm4(x) == pytest.approx(stats.kurtosis(x, fisher=False), rel=1e-12)
+    assert m6a(x) == pytest.approx(stats.moment(x, 6) / np.var(x) ** 3, rel=1e-12)
+    assert m8a(x) == pytest.approx(stats.moment(x, 8) / np.var(x) ** 4, rel=1e-12)
+
+
 def test_fm0_is_the_swing_over_the_mesh_lines():
     # In phase at angle 0, so that the peak is the sum: (1.4 + trough) / (1 + 0.4).
     average = of(wave(32) + wave(64, 0.4))
@@ -247,6 +255,20 @@ def test_modulations_come_out_as_they_were_put_in():
     np.testing.assert_allclose(found.phase_rad, p, atol=1e-8)
     assert found.mean_amplitude == pytest.approx(2.0)
     assert found.sideband_count == 15
+
+
+@pytest.mark.parametrize("samples", [1024, 1025])
+def test_demodulation_is_that_of_scipys_hilbert(samples):
+    """Of the same band, whose lines are cut out by a transform of numpy's."""
+    x = np.random.default_rng(6).normal(size=samples) + 5 * wave(32, samples=samples)
+    lines = np.fft.rfft(x)
+    lines[np.abs(np.arange(lines.size) - 32) > 10] = 0
+    analytic = signal.hilbert(np.fft.irfft(lines, samples))
+    np.testing.assert_allclose(mesh_envelope(of(x), TEETH, sideband_count=10), np.abs(analytic), atol=1e-12)
+    found = demodulate_mesh(of(x), TEETH, sideband_count=10)
+    phase = np.unwrap(np.angle(analytic)) - 2 * np.pi * 32 * turn(samples)
+    np.testing.assert_allclose(found.phase_rad, phase - phase.mean(), atol=1e-9)
+    np.testing.assert_allclose(found.amplitude, np.abs(analytic) / np.abs(analytic).mean() - 1, atol=1e-9)
 
 
 def test_a_soft_tooth_shows_at_its_angle():
