@@ -160,6 +160,18 @@ def test_what_is_not_heard_of_any_more_is_dropped_but_alarms_stay(metrics, clock
     assert only(found, "gearsim_alarm_level") == 2
 
 
+def test_a_node_that_has_come_to_know_its_machine_is_one_node(metrics):
+    metrics.alarm_state(AlarmState(0, "", "envelope", Level.OK, True, "no window judged yet", 0))
+    metrics.alarm_state(AlarmState(0, "", "kurtosis", Level.OK, True, "no window judged yet", 0))
+    metrics.diagnostics({("envelope: alarms", "gearsim"): 3})
+    metrics.alarm_state(AlarmState(6, "rig", "envelope", Level.OK, False, "", 1))
+    metrics.diagnostics({("envelope: alarms", "rig"): 0})
+    found = scrape(metrics)
+    stale = {(row["machine"], row["source"]) for row in labels(found, "gearsim_alarm_state_stale")}
+    assert stale == {("rig", "envelope"), ("", "kurtosis")}
+    assert labels(found, "gearsim_diagnostic_level") == [{"name": "envelope: alarms", "hardware_id": "rig"}]
+
+
 def test_memory_is_bounded_and_what_is_left_out_is_counted(metrics):
     for k in range(RigMetrics.MOST_SERIES + 10):
         metrics.features(replace(FEATURES, channel=f"c{k}"))

@@ -114,7 +114,7 @@ def _rig(voice: Voice) -> tuple[Probe, LoadWatch, int]:
                     watch.look(process.spec.name, process.pid)
                 stop.wait(1.0)
 
-        listener = _Listener(probe)
+        listener = Listener(probe)
         looker: list[threading.Thread] = []
 
         def started(graph: Graph) -> None:
@@ -132,7 +132,7 @@ def _rig(voice: Voice) -> tuple[Probe, LoadWatch, int]:
     return probe, watch, probe.lost + round(missing / 4096)
 
 
-class _Listener:
+class Listener:
     """Subscribes the probe to accel in a thread and context of its own."""
 
     def __init__(self, probe: Probe) -> None:
@@ -176,7 +176,7 @@ def _bare_pair(voice: Voice) -> Probe:
     voice.say(f"  a bare publisher for {BARE_SECONDS:g} s")
     probe = Probe()
     with tempfile.TemporaryDirectory(prefix="gearsim_bench_") as name, Graph(Path(name)) as graph:
-        listener = _Listener(probe)
+        listener = Listener(probe)
         graph.start(NodeSpec("bare", "gearsim_bringup.nodes.bare_publisher"))
         time.sleep(BARE_SECONDS)
         listener.close()

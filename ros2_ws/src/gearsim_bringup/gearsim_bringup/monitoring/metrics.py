@@ -125,8 +125,10 @@ class RigMetrics(Collector):
         with self._lock:
             self._count("alarm_state")
             labels = (state.frame_id, state.source)
-            self._states.put(labels, float(state.level), now_s)
-            self._stale.put(labels, float(state.stale), now_s)
+            for table, value in ((self._states, float(state.level)), (self._stale, float(state.stale))):
+                # What a node said before it knew its machine, or of another one, is over.
+                table.drop(lambda old: old[1] == state.source and old != labels)
+                table.put(labels, value, now_s)
             for alarm in state.active:
                 self._keep(alarm)
             active = {alarm.alarm_id for alarm in state.active}
@@ -139,7 +141,9 @@ class RigMetrics(Collector):
         now_s = self._clock_s()
         with self._lock:
             self._count("diagnostics")
-            for labels, level in levels.items():
+            latest = dict(levels)
+            self._diagnostics.drop(lambda old: any(old[0] == new[0] and old != new for new in latest))
+            for labels, level in latest.items():
                 self._diagnostics.put(labels, float(level), now_s)
 
     def collect(self) -> Iterator[Metric]:
