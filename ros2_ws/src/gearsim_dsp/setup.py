@@ -20,6 +20,7 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
+    package_data={NAME: ["judges/*.json"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -39,6 +39,7 @@ COMMANDS = {
     "bench": "bench",
     "gallery": "gallery",
     "figures": "figures",
+    "evaluate": "evaluate",
     "parameters": "parameters",
     "data": "data",
 }

@@ -8,20 +8,25 @@ evidence.
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gearsim_dsp.angle.record_speed import record_speed
 from gearsim_dsp.decide import Finding, Verdict, find_faults
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
 from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.judges.bearing import find_strange_comb
+from gearsim_dsp.judges.combine import all_findings
+from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.kinematics import mesh_orders
-from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.quality import QualityIssue, check_levels
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import Report
+from gearsim_dsp.streams.window_speeds import KnownSpeeds, LiveSpeeds, WindowSpeeds
 from gearsim_io.batches import TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.importers import machine_for
@@ -70,11 +75,12 @@ class Diagnosis:
     machine: str = ""
     source: str = ""
     verdict: Verdict | None = field(default=None, repr=False, compare=False)
+    judged_parts: tuple[str, ...] = ()
 
     @property
     def judged(self) -> bool:
-        """False when no channel could be judged for bearing faults."""
-        return self.verdict is not None and bool(self.verdict.evidence)
+        """False when nothing on the machine could be judged."""
+        return bool(self.judged_parts)
 
     @property
     def healthy(self) -> bool:
@@ -105,8 +111,8 @@ class Diagnosis:
         ]
         lines += [_finding_line(finding) for finding in self.findings]
         if not self.findings:
-            # Bearings are all that is judged so far: silence about gears must not read as their health.
-            judged = "no bearing fault found (gears, planets and shafts are not judged)"
+            # Silence about what was not judged must not read as its health.
+            judged = f"no fault found; judged: {', '.join(self.judged_parts)}"
             lines.append(judged if self.judged else "no fault found: nothing could be judged")
         return lines
 
@@ -146,7 +152,11 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         expected = "a channel of the machine: " + ", ".join(sorted(known))
         raise InputError(record.source or "record", "channels", ", ".join(record.channels), expected)
     window = _window(record, plate, settings)
-    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window))
+    angle = record_speed(record, plate)
+    speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
+    if angle.replaces_angle and angle.speed is not None:
+        speeds = KnownSpeeds(angle.speed, record.first_sample)
+    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window), speeds=speeds)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
     pool = EvidencePool(plate)
     reports: list[Report] = []
@@ -159,8 +169,43 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     reports += _pooled(envelope.finish(), pool)
     impulsive += kurtosis.finish()
     verdict = find_faults(plate, pool)
-    quality = _quality(record, plate, verdict, reports, impulsive)
-    return Diagnosis(verdict.speed, tuple(quality), verdict.findings, plate.name, record.source, verdict)
+    notes = _quality(record, plate, verdict, reports)
+    speed = angle.speed or verdict.speed
+    # A wrong angle signal is not to be read again.
+    sound = replace(record, tachos=(), encoders=()) if angle.replaces_angle else record
+    measured = Measured.of_record(sound, plate, speed, _unfit(notes))
+    findings = all_findings(measured, verdict.findings)
+    electrical = _electrical_notes(record, plate, verdict, findings)
+    if not findings:
+        supply = plate.line_frequency_hz or 50.0
+        strange = find_strange_comb(plate, pool, (supply, 60.0))
+        findings = (strange,) if strange else ()
+    quality = (*angle.issues, *notes, *electrical, *(() if findings else _unexplained(verdict, impulsive)))
+    return Diagnosis(
+        verdict.speed,
+        tuple(dict.fromkeys(quality)),
+        findings,
+        plate.name,
+        record.source,
+        verdict,
+        _judged_parts(measured, verdict),
+    )
+
+
+def _unfit(notes: list[QualityIssue]) -> frozenset[str]:
+    """Channels that are constant, broken or not finite."""
+    return frozenset(note.channel for note in notes if note.fatal and note.channel)
+
+
+def _judged_parts(measured: Measured, verdict: Verdict) -> tuple[str, ...]:
+    """Kinds of parts that were looked at; what needs the angle is looked at only where that is known."""
+    machine = measured.machine
+    parts = ["bearings"] if verdict.evidence else []
+    if measured.phase is not None and measured.channels:
+        parts += ["gears"] if machine.gear_meshes else []
+        parts += ["planets"] if machine.planetary_stages else []
+        parts += ["shafts"] if machine.bearings and measured.unit == "m/s^2" else []
+    return tuple(parts)
 
 
 def _pooled(reports: list[Report], pool: EvidencePool) -> list[Report]:
@@ -180,30 +225,31 @@ def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> Wi
     return WindowSettings(window_s=length, hop_s=max(0.01, length / 4), angle_wait_s=0.0)
 
 
-def _quality(
-    record: Record,
-    machine: Machine,
-    verdict: Verdict,
-    reports: list[Report],
-    impulsive: list[Report],
-) -> list[QualityIssue]:
+def _quality(record: Record, machine: Machine, verdict: Verdict, reports: list[Report]) -> list[QualityIssue]:
     issues = _merged(reports)
     if not reports:
         detail = f"{record.seconds:.3g} s are too short for one window"
         issues.append(QualityIssue("too_short", "", detail, True))
     issues += _about_speed(machine, verdict.speed)
+    issues += check_levels(record, machine)
     if not machine.bearings:
         detail = "the nameplate lists no bearings: no fault family could be looked for"
         issues.append(QualityIssue("nothing_to_look_for", "", detail))
-    for row, channel in enumerate(record.channels):
-        if not np.all(np.isfinite(record.data[row])):
-            continue
-        lines = _electrical(record, row, machine, verdict)
-        issues += _line_notes(lines, channel)
-    if not verdict.findings:
-        issues += verdict.notes
-        issues += _impacts(impulsive)
     return issues
+
+
+def _electrical_notes(
+    record: Record, machine: Machine, verdict: Verdict, findings: tuple[Finding, ...]
+) -> list[QualityIssue]:
+    issues = []
+    for row, channel in enumerate(record.channels):
+        if np.all(np.isfinite(record.data[row])):
+            issues += _line_notes(_electrical(record, row, machine, verdict, findings), channel)
+    return issues
+
+
+def _unexplained(verdict: Verdict, impulsive: list[Report]) -> tuple[QualityIssue, ...]:
+    return (*verdict.notes, *_impacts(impulsive))
 
 
 def _merged(reports: list[Report]) -> list[QualityIssue]:
@@ -239,13 +285,15 @@ def _about_speed(machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
     return issues
 
 
-def _electrical(record: Record, row: int, machine: Machine, verdict: Verdict) -> ElectricalLines:
+def _electrical(
+    record: Record, row: int, machine: Machine, verdict: Verdict, findings: tuple[Finding, ...]
+) -> ElectricalLines:
     turn = verdict.speed.value_hz
     lines: list[float] = []
     if np.isfinite(turn):
         lines += [turn * shaft.ratio for shaft in machine.shafts]
         lines += [turn * order for order in mesh_orders(machine).values()]
-    lines += [finding.found_hz for finding in verdict.findings]
+    lines += [finding.found_hz for finding in findings]
     error = verdict.speed.relative_error if np.isfinite(turn) else 1e-3
     return find_electrical_lines(
         record.data[row], record.sample_rate_hz, machine.line_frequency_hz, lines, max(error, 1e-4)

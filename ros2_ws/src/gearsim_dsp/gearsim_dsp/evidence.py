@@ -32,6 +32,8 @@ class ChannelSpectra:
         Averaged squared envelope spectra; line k at order k * `order_step`.
     level, kurtosis : ndarray of float64, shape (bands,)
         Mean over the windows of the bands' mean squares and excess kurtosis.
+    whole : float
+        Mean square of the signal below 4 kHz with all its lines, to compare levels with.
     order_step : float
     turns : float
         Mean number of turns behind each window: independent lines are 1 / turns apart.
@@ -50,6 +52,7 @@ class ChannelSpectra:
     power: NDArray[np.float64]
     level: NDArray[np.float64]
     kurtosis: NDArray[np.float64]
+    whole: float
     order_step: float
     turns: float
     averages: float
@@ -201,6 +204,7 @@ def _averaged(
         power=np.stack([total.power for _, total in bands]) / count,
         level=np.array([total.level for _, total in bands]) / count,
         kurtosis=np.array([total.kurtosis for _, total in bands]) / count,
+        whole=float(np.sum(channel.low)) / count if channel.low is not None else 0.0,
         order_step=last.spectra[0].order_step,
         turns=float(np.mean([m[1] for m in channel.marks])),
         averages=_averages(starts, last.sample_count),

@@ -22,6 +22,9 @@ _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _MOST_DOMINANCE = 1000.0
 _CLEAR = 12.0
+# Powers of a band over that of the channel, and over that of the loudest channel, below which it holds only
+# leakage and rounding: sensors and converters do not reach so far down.
+_LEAST_OF_OWN, _LEAST_OF_ALL = 1e-7, 1e-8
 _REFINE_SHARE = 0.25
 _PLATEAU = 0.7
 _TOP_HARMONICS = 4
@@ -97,14 +100,26 @@ class FamilySearch:
         the search.
     looks : int
         Channels times families searched in all, for the false-alarm probability.
+    loudest : float
+        Greatest mean square of a channel (`ChannelSpectra.whole`); bands that are nothing beside it are left
+        out.
     """
 
-    def __init__(self, machine: Machine, spectra: ChannelSpectra, speed: ShaftSpeed, looks: int) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        spectra: ChannelSpectra,
+        speed: ShaftSpeed,
+        looks: int,
+        loudest: float = 0.0,
+    ) -> None:
         self._spectra = spectra
         self._looks = looks
         self._scale = speed.value_hz / spectra.axis_speed_hz
         self._doubt = max(speed.relative_error, 0.0)
         self._resolution = 1.0 / spectra.turns
+        least = max(_LEAST_OF_OWN * spectra.whole, _LEAST_OF_ALL * loudest)
+        self._filled = spectra.level > least
         floor = local_floor(spectra.power, _BLOCK_LINES, spectra.averages, _SKIP_LINES)
         self._excess = spectra.power - floor
         self._ratio, self._tail = self._with_mean(spectra.power / floor)
@@ -162,7 +177,7 @@ class FamilySearch:
             sideband_snr_db=sidebands,
             snr_db=max(harmonics[:4], default=float("nan")),
             false_alarm_probability=p,
-            modulation=float(modulation[band]),
+            modulation=float(modulation[band]) if self._filled[band] else 0.0,
             dominance=self._dominance(family, found, band, float(modulation[band])) if p < 0.01 else 0.0,
             by_band=self._by_band(scores.score[:, best] - np.log(trials), modulation),
             windows=spectra.windows,
@@ -204,9 +219,9 @@ class FamilySearch:
     def _band(self, score: NDArray[np.float64], modulation: NDArray[np.float64], trials: float) -> int:
         """The band with the largest modulation among those where the comb itself is significant."""
         bands = modulation.size
-        clear = score[:bands] - np.log(trials) > _CLEAR
+        clear = (score[:bands] - np.log(trials) > _CLEAR) & self._filled
         if not np.any(clear):
-            return int(np.argmax(score[:bands]))
+            return int(np.argmax(np.where(self._filled, score[:bands], -1.0)))
         return int(np.argmax(np.where(clear, modulation, -1.0)))
 
     def _refined(self, grid: CombGrid, at: int, row: int) -> float:

@@ -7,12 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["QualityIssue", "check_samples"]
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import Record
+
+__all__ = ["QualityIssue", "check_levels", "check_samples"]
 
 _CLIP_COUNT = 10
 _CLIP_SHARE = 1e-4
 _CLIP_MARGIN = 0.01
 _CLIP_EXCESS = 3
+_PLAUSIBLE_MS2 = (1e-5, 5e3)  # RMS between a good sensor's own noise and what breaks sensors
+_ODD_LEVEL = 300.0  # over or under all other channels: no bearing is that much louder than the next
+_OFFSET_RATIO = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +76,53 @@ def check_samples(
     if held > max(64, x.size // 2000) and not clipped:
         issues.append(QualityIssue("dropout", channel, f"one value is held for {held} samples"))
     return tuple(issues)
+
+
+def check_levels(record: Record, machine: Machine) -> list[QualityIssue]:
+    """What the levels of a record's channels say of units, gains and zeros.
+
+    Parameters
+    ----------
+    record : Record
+    machine : Machine
+        Its channels' full scales.
+
+    Returns
+    -------
+    list of QualityIssue
+        "beyond_full_scale", "implausible_level" (in m/s^2 only), "odd_level" (of one channel among three or
+        more) and "offset"; none is fatal, as shapes can be judged all the same.
+    """
+    scale = {channel.name: channel.full_scale for channel in machine.channels}
+    rows: dict[str, tuple[float, float]] = {}
+    issues = []
+    for name, row in zip(record.channels, record.data, strict=True):
+        if not np.all(np.isfinite(row)) or np.ptp(row) == 0:
+            continue
+        mean, rms = float(np.mean(row, dtype=np.float64)), float(np.std(row, dtype=np.float64))
+        rows[name] = mean, rms
+        top = float(np.max(np.abs(row)))
+        if top > 1.02 * scale.get(name, float("nan")):
+            detail = (
+                f"values up to {top:.4g} where the nameplate's range ends at {scale[name]:.4g}: unit or gain"
+            )
+            issues.append(QualityIssue("beyond_full_scale", name, detail))
+        low, high = _PLAUSIBLE_MS2
+        if record.unit == "m/s^2" and not low <= rms <= high:
+            word = "less" if rms < low else "more"
+            detail = f"an RMS of {rms:.3g} m/s^2 is {word} than machines give: unit or gain"
+            issues.append(QualityIssue("implausible_level", name, detail))
+        if abs(mean) > _OFFSET_RATIO * rms:
+            issues.append(QualityIssue("offset", name, f"a mean of {mean:.3g} over an RMS of {rms:.3g}"))
+    if len(rows) >= 3:
+        levels = {name: rms for name, (_, rms) in rows.items()}
+        for name, rms in levels.items():
+            others = [value for other, value in levels.items() if other != name]
+            if rms > _ODD_LEVEL * max(others) or rms * _ODD_LEVEL < min(others):
+                span = f"{min(others):.3g} to {max(others):.3g}"
+                detail = f"an RMS of {rms:.3g} where the other channels have {span}"
+                issues.append(QualityIssue("odd_level", name, detail))
+    return issues
 
 
 def _piled(x: NDArray[np.floating], top: float, span: float) -> int:

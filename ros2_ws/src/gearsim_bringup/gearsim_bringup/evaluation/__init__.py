@@ -1,0 +1,1 @@
+"""How often the diagnosis is right: random machines are simulated, diagnosed and scored."""

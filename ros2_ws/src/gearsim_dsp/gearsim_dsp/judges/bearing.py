@@ -1,0 +1,380 @@
+"""Bearings: which one, which part of it, from averaged squared envelope spectra.
+
+A family of lines is a finding when three things hold together:
+
+1. It is improbable as noise: the false-alarm probability of its comb, with all bands, channels, families and
+   candidate orders searched accounted for, is below `ALARM_PROBABILITY`.
+2. It is large: the squared envelope is modulated, as mean square of the family's lines relative to the
+   squared mean, by `MODULATION_LIMIT` or more. Stationary Gaussian noise has 1 in all lines together; sound
+   bearings and gears modulate by a few per cent at most.
+3. It is this family and no other: no comb at an unrelated order in the same band is nearly as strong.
+
+Families are accepted one by one, the strongest first; the lines of an accepted one no longer count for
+others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.families import FamilyEvidence, FamilySearch
+from gearsim_dsp.judges.confidence import confidence
+from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.kinematics import FaultFamily, fault_families
+from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.speed import ShaftSpeed
+from gearsim_io.nameplate import Machine
+
+__all__ = [
+    "ALARM_PROBABILITY",
+    "DOMINANCE_LIMIT",
+    "MODULATION_LIMIT",
+    "Verdict",
+    "find_faults",
+    "find_strange_comb",
+    "is_fault",
+]
+
+ALARM_PROBABILITY = 1e-4
+MODULATION_LIMIT = 0.12
+DOMINANCE_LIMIT = 1.6
+_MOST_FINDINGS = 4
+_CAGE_FUNDAMENTAL_DB = 10.0
+_CAGES_ALIKE = 0.06
+_SECOND_DOMINANCE = 3.0
+_SECOND_SHARE = 0.2
+_STRANGE_LOW, _STRANGE_HIGH, _STRANGE_REACH = 1.5, 15.0, 0.15
+_STRANGE_PROBABILITY = 1e-8
+_STRANGE_MODULATION = 0.25
+_STRANGE_DB = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the spectra say: findings, the evidence of every family on its best channel, notes, the speed.
+
+    `by_channel` holds the evidence of every group of like families (under the name of its first) on every
+    channel, before the lines of a finding were taken out for others.
+    """
+
+    findings: tuple[Finding, ...]
+    evidence: tuple[FamilyEvidence, ...]
+    notes: tuple[QualityIssue, ...]
+    speed: ShaftSpeed
+    by_channel: tuple[FamilyEvidence, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Families with the same lines (bearings of one type on shafts of one speed)."""
+
+    families: tuple[FaultFamily, ...]
+
+    @property
+    def first(self) -> FaultFamily:
+        return self.families[0]
+
+
+def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
+    """Judge all fault families of the machine on the evidence pooled.
+
+    Parameters
+    ----------
+    machine : Machine
+    pool : EvidencePool
+
+    Returns
+    -------
+    Verdict
+        Findings strongest first; `evidence` has one entry per family, also for those not found.
+    """
+    speed = pool.speed()
+    channels = pool.spectra()
+    groups = _groups(machine)
+    if not channels or not groups:
+        return Verdict((), (), (), speed)
+    looks = len(groups) * len(channels)
+    loudest = max(spectra.whole for spectra in channels)
+    searches = [FamilySearch(machine, spectra, speed, looks, loudest) for spectra in channels]
+    latest = {id(group): _judge(group, searches) for group in groups}
+    by_channel = tuple(evidence for group in groups for evidence in latest[id(group)])
+    findings: list[Finding] = []
+    open_groups = list(groups)
+    while open_groups and len(findings) < _MOST_FINDINGS:
+        good = [g for g in open_groups if _stands(machine, g, latest[id(g)], findings)]
+        if not good:
+            break
+        best = max(good, key=lambda g: _best(latest[id(g)]).modulation)
+        findings.append(_finding(machine, best, latest[id(best)], speed))
+        open_groups.remove(best)
+        open_groups = [g for g in open_groups if not _accompanies(machine, g, findings[-1])]
+        for search in searches:
+            search.explain(best.first, _best(latest[id(best)]).found_order)
+        for group in open_groups:
+            latest[id(group)] = _judge(group, searches)
+    evidence = tuple(replace(_best(latest[id(g)]), family=family) for g in groups for family in g.families)
+    return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed, by_channel)
+
+
+def find_strange_comb(machine: Machine, pool: EvidencePool, skip_hz: Sequence[float] = ()) -> Finding | None:
+    """A strong family of lines that belongs to nothing on the nameplate, as a finding of fault "unknown".
+
+    Parameters
+    ----------
+    machine : Machine
+    pool : EvidencePool
+    skip_hz : sequence of float
+        Frequencies (supply and the like) whose multiples have another explanation.
+
+    Notes
+    -----
+    Fundamentals from 1.3 to 15 orders, in stretches of 15 % either way. The limits are stricter than those of
+    families that the nameplate expects: what nobody expects needs better evidence.
+    """
+    speed = pool.speed()
+    channels = pool.spectra()
+    if not channels or not np.isfinite(speed.value_hz):
+        return None
+    centres = _STRANGE_LOW * ((1 + _STRANGE_REACH) / (1 - _STRANGE_REACH)) ** np.arange(9)
+    families = [
+        FaultFamily("", "unknown", float(centre), 0.0, "unknown", _STRANGE_REACH)
+        for centre in centres
+        if centre < _STRANGE_HIGH
+    ]
+    looks = len(families) * len(channels)
+    loudest = max(spectra.whole for spectra in channels)
+    searches = [FamilySearch(machine, spectra, speed, looks, loudest) for spectra in channels]
+    expected = [family.order for family in fault_families(machine)]
+    best: FamilyEvidence | None = None
+    for search in searches:
+        for family in families:
+            found = search.judge(family)
+            if _is_strange(found, expected, skip_hz) and (best is None or found.modulation > best.modulation):
+                best = found
+    return None if best is None else _strange_finding(best, speed)
+
+
+def _is_strange(evidence: FamilyEvidence, expected: Sequence[float], skip_hz: Sequence[float]) -> bool:
+    clear = sum(level >= _STRANGE_DB for level in evidence.harmonic_snr_db[:4])
+    if (
+        evidence.false_alarm_probability > _STRANGE_PROBABILITY
+        or evidence.modulation < _STRANGE_MODULATION
+        or evidence.dominance < DOMINANCE_LIMIT
+        or clear < 3
+    ):
+        return False
+    # A multiple or an even part of what a bearing does is that bearing's affair.
+    for order in expected:
+        for factor in (1 / 3, 0.5, 1.0, 2.0, 3.0):
+            if abs(evidence.found_order / (order * factor) - 1.0) < 0.02:
+                return False
+    return not any(
+        abs(evidence.found_hz / hz - max(1.0, round(evidence.found_hz / hz))) * hz < 0.004 * evidence.found_hz
+        for hz in skip_hz
+        if hz > 0
+    )
+
+
+def _strange_finding(evidence: FamilyEvidence, speed: ShaftSpeed) -> Finding:
+    features = {"modulation": math.log(evidence.modulation / _STRANGE_MODULATION)}
+    details: dict[str, object] = {
+        "what": "impacts at a rate that belongs to nothing on the nameplate",
+        "channel": evidence.channel,
+        "band_hz": [evidence.band.low_hz, evidence.band.high_hz],
+        "frequency_hz": evidence.found_hz,
+        "harmonic_snr_db": [round(v, 2) for v in evidence.harmonic_snr_db],
+        "false_alarm_probability": evidence.false_alarm_probability,
+        "modulation": evidence.modulation,
+        "dominance": evidence.dominance,
+        "speed_source": speed.source,
+        "features": features,
+    }
+    return Finding(
+        "",
+        "unknown",
+        evidence.found_order,
+        evidence.found_order,
+        evidence.found_hz,
+        evidence.snr_db,
+        confidence("unknown", features),
+        _severity(evidence.modulation),
+        evidence.channel,
+        details,
+    )
+
+
+def _stands(machine: Machine, group: _Group, judged: list[FamilyEvidence], findings: list[Finding]) -> bool:
+    """True for a fault that is no companion of one found before.
+
+    On one bearing BPFO + BPFI = N turns: a fault of one race whose amplitude swings with the shaft has
+    sidebands next to the other's lines. A second fault of a bearing must be clearer than a first.
+    """
+    evidence = _best(judged)
+    if not is_fault(evidence):
+        return False
+    component = _component(machine, group, judged)[0].component
+    for finding in findings:
+        first = finding.evidence["modulation"]
+        assert isinstance(first, float)
+        if finding.component == component and (
+            evidence.dominance < _SECOND_DOMINANCE or evidence.modulation < _SECOND_SHARE * first
+        ):
+            return False
+    return True
+
+
+def _accompanies(machine: Machine, group: _Group, finding: Finding) -> bool:
+    """A damaged race is struck harder by some elements than by others, so lines of its cage come with it.
+
+    Cages of other bearings on the shaft turn at nearly the same speed, and cannot be told from it.
+    """
+    if group.first.fault != "cage":
+        return False
+    cages = [
+        f.order for f in fault_families(machine) if f.fault == "cage" and f.component == finding.component
+    ]
+    return any(abs(group.first.order / order - 1.0) < _CAGES_ALIKE for order in cages)
+
+
+def _groups(machine: Machine) -> list[_Group]:
+    found: dict[tuple[object, ...], list[FaultFamily]] = {}
+    for family in fault_families(machine):
+        key = (family.label, round(family.order, 4), round(family.sideband_order, 4))
+        found.setdefault(key, []).append(family)
+    return [_Group(tuple(families)) for families in found.values()]
+
+
+def _judge(group: _Group, searches: list[FamilySearch]) -> list[FamilyEvidence]:
+    return [search.judge(group.first) for search in searches]
+
+
+def _best(judged: list[FamilyEvidence]) -> FamilyEvidence:
+    """The channel that decides: the largest modulation among those improbable enough, else the least
+    probable.
+    """
+    sure = [e for e in judged if e.false_alarm_probability < ALARM_PROBABILITY]
+    if sure:
+        return max(sure, key=lambda e: e.modulation * min(e.dominance, DOMINANCE_LIMIT))
+    return min(judged, key=lambda e: e.false_alarm_probability)
+
+
+def is_fault(evidence: FamilyEvidence) -> bool:
+    """True when a family is improbable as noise, large, and no other's lines: all three limits hold."""
+    return (
+        evidence.false_alarm_probability < ALARM_PROBABILITY
+        and evidence.modulation >= MODULATION_LIMIT
+        and evidence.dominance >= DOMINANCE_LIMIT
+        and (evidence.family.fault != "cage" or evidence.harmonic_snr_db[0] >= _CAGE_FUNDAMENTAL_DB)
+    )
+
+
+def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], speed: ShaftSpeed) -> Finding:
+    evidence = _best(judged)
+    family, shares = _component(machine, group, judged)
+    features = {
+        "modulation": math.log(evidence.modulation / MODULATION_LIMIT),
+        "dominance": math.log(max(evidence.dominance, 1e-3) / DOMINANCE_LIMIT),
+        "share": _share_of_two(shares, family.component),
+        "improbable": min(-math.log10(max(evidence.false_alarm_probability, 1e-30)), 30.0) / 10.0,
+        "harmonics": float(sum(level >= 6.0 for level in evidence.harmonic_snr_db)) / 4.0,
+    }
+    details: dict[str, object] = {
+        "channel": evidence.channel,
+        "band_hz": [evidence.band.low_hz, evidence.band.high_hz],
+        "band_choice": evidence.band.why,
+        "frequency_hz": evidence.found_hz,
+        "harmonic_snr_db": [round(v, 2) for v in evidence.harmonic_snr_db],
+        "sideband_snr_db": [round(v, 2) for v in evidence.sideband_snr_db],
+        "false_alarm_probability": evidence.false_alarm_probability,
+        "modulation": evidence.modulation,
+        "dominance": evidence.dominance,
+        "windows": evidence.windows,
+        "speed_source": speed.source,
+        "features": features,
+    }
+    if shares:
+        details["component_shares"] = shares
+    return Finding(
+        family.component,
+        family.fault,
+        family.order,
+        evidence.found_order,
+        evidence.found_hz,
+        evidence.snr_db,
+        confidence(family.fault, features),
+        _severity(evidence.modulation),
+        evidence.channel,
+        details,
+    )
+
+
+def _share_of_two(shares: dict[str, float], component: str) -> float:
+    """Logarithm of the bearing's share over that of the next one: 0 where they are alike, 3 at most."""
+    if not shares:
+        return 3.0
+    other = max((value for name, value in shares.items() if name != component), default=0.0)
+    return min(3.0, math.log(max(shares[component], 1e-12) / max(other, 1e-12)))
+
+
+def _component(
+    machine: Machine, group: _Group, judged: list[FamilyEvidence]
+) -> tuple[FaultFamily, dict[str, float]]:
+    """Which of several like bearings it is."""
+    if len(group.families) == 1:
+        return group.first, {}
+    shares = _shares(machine, group, judged)
+    best = max(group.families, key=lambda f: shares[f.component])
+    return best, shares
+
+
+def _shares(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> dict[str, float]:
+    """Share of each bearing in the modulation, the mean over all bands where it is clear counted in decibels.
+
+    What comes through the shaft and the casing from another bearing reaches a channel at low frequencies at
+    almost full strength and at high frequencies hardly at all; so each band has a say, and not the loudest.
+    """
+    levels = {e.channel: {b.band: b.amplitude for b in e.by_band} for e in judged}
+    common = set.intersection(*(set(bands) for bands in levels.values()))
+    clear = {b.band for e in judged for b in e.by_band if b.clear} & common
+    bands = sorted(clear or common, key=lambda band: band.low_hz)
+    mean: dict[str, float] = {}
+    for family in group.families:
+        near = [levels[c] for c in machine.bearing(family.component).channels if c in levels]
+        if near and bands:
+            loudest = [max(max(level[band] for level in near), 1e-300) for band in bands]
+            mean[family.component] = float(np.exp(np.mean(np.log(loudest))))
+    total = sum(mean.values())
+    if total <= 0:
+        return {f.component: 1.0 / len(group.families) for f in group.families}
+    return {f.component: mean.get(f.component, 0.0) / total for f in group.families}
+
+
+def _severity(modulation: float) -> str:
+    if modulation >= 1.0:
+        return "severe"
+    return "moderate" if modulation >= 0.25 else "slight"
+
+
+def _notes(groups: list[_Group], latest: dict[int, list[FamilyEvidence]]) -> list[QualityIssue]:
+    """Families that are there without doubt and too weak to be called a fault."""
+    notes = []
+    for group in groups:
+        evidence = _best(latest[id(group)])
+        weak = 0.25 * MODULATION_LIMIT <= evidence.modulation < MODULATION_LIMIT
+        if (
+            weak
+            and evidence.false_alarm_probability < ALARM_PROBABILITY
+            and len(evidence.harmonic_snr_db) > 1
+        ):
+            names = ", ".join(f.component for f in group.families)
+            detail = (
+                f"{group.first.label} of {names} at {evidence.found_hz:.2f} Hz modulates the envelope by "
+                f"{100 * evidence.modulation:.1f} %, below the {100 * MODULATION_LIMIT:.0f} % of a finding"
+            )
+            notes.append(QualityIssue("weak_modulation", evidence.channel, detail))
+    return notes

@@ -1,0 +1,49 @@
+"""All findings of a record: those of every judge, without what one fault only looks like to another judge."""
+
+from __future__ import annotations
+
+from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.judges.measured import Measured
+from gearsim_dsp.judges.registry import judge_all
+
+__all__ = ["all_findings"]
+
+_SAME_ORDER = 0.012
+_TOOTH_FAULTS = ("gear_tooth_crack", "gear_tooth_spall", "planet_tooth_crack", "planet_tooth_spall")
+
+
+def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Findings of bearings and of all other judges, the surest first.
+
+    Parameters
+    ----------
+    measured : Measured
+    bearings : tuple of Finding
+        What the envelope spectra said.
+
+    Notes
+    -----
+    Strong impacts of one tooth, once a turn, fill the envelope with the shaft's lines; what a bearing is then
+    said to have at a multiple of that speed is the tooth. A bad tooth also raises the unevenness by which
+    wear is judged; the gear judge sees to that itself.
+    """
+    others = judge_all(measured)
+    teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
+    kept = [one for one in bearings if not any(_is_multiple(one, tooth) for tooth in teeth)]
+    rotors = [one for one in others if one.fault == "unbalance"]
+    kept += [one for one in others if not _is_rotors_doing(one, rotors)]
+    return tuple(sorted(kept, key=lambda one: -one.confidence))
+
+
+def _is_rotors_doing(finding: Finding, rotors: list[Finding]) -> bool:
+    """A heavy shaft moves its wheel too, once a turn of either."""
+    return finding.fault == "gear_eccentricity" and any(
+        abs(finding.found_order / rotor.found_order - 1.0) < 1e-3 for rotor in rotors
+    )
+
+
+def _is_multiple(bearing: Finding, tooth: Finding) -> bool:
+    number = round(bearing.found_order / tooth.found_order)
+    return (
+        number >= 1 and abs(bearing.found_order / (number * tooth.found_order) - 1.0) < _SAME_ORDER / number
+    )

@@ -1,0 +1,223 @@
+"""Shafts: unbalance, misalignment of couplings, loose feet, from the low orders of the shaft's own bearings.
+
+Levels are velocities, whose limits are steps of ISO 10816-1 (class I: up to 0.71 mm/s RMS good, 1.8
+acceptable, 4.5 bad). Sound rigs reach 1.0 mm/s at order 1 and 0.5 mm/s at its harmonics (MFPT baselines), so
+there is no finding below 1.8 and 1.12 mm/s. What turns with the shaft:
+
+unbalance       order 1 in every direction across the shaft, little else
+misalignment    orders 2 to 8 strong against order 1 (jaws work three times a turn, universal joints twice)
+looseness       many orders, halves among them, on one bearing's pedestal much more than on the others
+
+The harmonics of a gear mesh lie far above; a wheel off its axis presses along the line of action only, so
+of two directions the weaker one counts where both are measured.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_dsp.angle.resample import to_angle
+from gearsim_dsp.judges.confidence import confidence
+from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.judges.measured import Measured
+from gearsim_dsp.synchronous.tsa import synchronous_average
+from gearsim_io.nameplate import Bearing, Shaft
+
+__all__ = ["BearingLevels", "bearing_levels", "judge_shafts"]
+
+Array = NDArray[np.float64]
+
+_LEAST_TURNS = 12.0
+_SAMPLES_PER_TURN = 64
+_PERIOD_TURNS = 2  # so that half orders have lines of their own
+_TOP_ORDER = 8
+_SURE = 5.0  # amplitudes of noise
+_UNBALANCE_MM_S = 1.8
+_HARMONICS_MM_S = 1.12
+_MODERATE_MM_S, _SEVERE_MM_S = 4.5, 11.2
+_HARMONIC_SHARE = 0.35
+_LOOSE_ORDERS = 6
+_LOOSE_OVER_OTHERS = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BearingLevels:
+    """Velocities at one bearing.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    channel : str
+        With the largest sum.
+    velocity_mm_s : ndarray, shape (16,)
+        RMS at orders 0.5, 1, 1.5 ... 8 of the shaft, of the strongest channel; what does not stand out of the
+        noise is 0.
+    all_round_mm_s : float
+        Order 1 in the direction in which it is weakest.
+    directions : int
+        Directions measured.
+    """
+
+    bearing: Bearing
+    channel: str
+    velocity_mm_s: Array
+    all_round_mm_s: float
+    directions: int
+
+    @property
+    def first(self) -> float:
+        """Order 1."""
+        return float(self.velocity_mm_s[1])
+
+    @property
+    def harmonics(self) -> float:
+        """Orders 2 to 8 together."""
+        return float(np.sqrt(np.sum(self.velocity_mm_s[3::2] ** 2)))
+
+    @property
+    def halves(self) -> float:
+        """Orders 0.5, 1.5 ... together."""
+        return float(np.sqrt(np.sum(self.velocity_mm_s[0::2] ** 2)))
+
+    @property
+    def total(self) -> float:
+        """All orders together."""
+        return float(np.sqrt(np.sum(self.velocity_mm_s**2)))
+
+    @property
+    def count(self) -> int:
+        """Orders that stand out of the noise with a tenth of the strongest at least."""
+        return int(np.count_nonzero(self.velocity_mm_s > 0.1 * self.velocity_mm_s.max(initial=0.0)))
+
+
+def judge_shafts(measured: Measured) -> tuple[Finding, ...]:
+    """Findings on shafts and feet; none without an angle signal or where the unit is not m/s^2."""
+    if measured.phase is None or measured.unit != "m/s^2":
+        return ()
+    levels = bearing_levels(measured)
+    loose = _looseness(measured, levels)
+    if loose:
+        return loose
+    found: list[Finding] = []
+    ratios = {round(shaft.ratio, 9) for shaft in measured.machine.shafts}
+    for ratio in sorted(ratios):
+        shafts = [s for s in measured.machine.shafts if abs(s.ratio / ratio - 1) < 1e-6 and s.name in levels]
+        # Shafts of one speed shake each other; the one with the higher levels is meant.
+        if shafts:
+            shaft = max(shafts, key=lambda s: max(one.total for one in levels[s.name]))
+            finding = _of_shaft(measured, shaft, levels[shaft.name])
+            found += [finding] if finding else []
+    return tuple(found)
+
+
+def bearing_levels(measured: Measured) -> dict[str, list[BearingLevels]]:
+    """Velocities at the bearings of each shaft that has sensors near them and turned often enough."""
+    found: dict[str, list[BearingLevels]] = {}
+    for bearing in measured.machine.bearings:
+        shaft = measured.machine.shaft(bearing.shaft)
+        channels = [name for name in bearing.channels if name in measured.channels]
+        if not channels or measured.turns * shaft.ratio < _LEAST_TURNS or bearing.outer_ring_rotates:
+            continue
+        rows = {name: _velocities(measured, name, shaft) for name in channels}
+        loudest = max(rows, key=lambda name: float(np.sum(rows[name] ** 2)))
+        found.setdefault(shaft.name, []).append(
+            BearingLevels(
+                bearing, loudest, rows[loudest], min(float(row[1]) for row in rows.values()), len(rows)
+            )
+        )
+    return found
+
+
+def _velocities(measured: Measured, channel: str, shaft: Shaft) -> Array:
+    assert measured.phase is not None
+    signal = to_angle(measured.channels[channel], measured.phase, _SAMPLES_PER_TURN, ratio=shaft.ratio)
+    average = synchronous_average(signal, _PERIOD_TURNS)
+    _, amplitude = average.spectrum()
+    # Of white noise each line has the amplitude 2 rms / sqrt(N).
+    noise = 2.0 * average.noise_rms / math.sqrt(average.values.size)
+    lines = np.arange(1, 2 * _TOP_ORDER + 1)
+    speed = shaft.ratio * measured.speed.value_hz
+    velocity = amplitude[lines] / (2 * np.pi * 0.5 * lines * speed) / math.sqrt(2.0) * 1e3
+    return np.asarray(np.where(amplitude[lines] > _SURE * noise, velocity, 0.0))
+
+
+def _looseness(measured: Measured, levels: dict[str, list[BearingLevels]]) -> tuple[Finding, ...]:
+    everyone = [one for group in levels.values() for one in group]
+    if len(everyone) < 2:
+        return ()
+    worst = max(everyone, key=lambda one: math.hypot(one.harmonics, one.halves))
+    own = math.hypot(worst.harmonics, worst.halves)
+    others = [math.hypot(one.harmonics, one.halves) for one in everyone if one is not worst]
+    over = own / max(max(others), 1e-6)
+    if own < _HARMONICS_MM_S or worst.count < _LOOSE_ORDERS or over < _LOOSE_OVER_OTHERS:
+        return ()
+    features = {
+        "level": math.log(own / _HARMONICS_MM_S),
+        "over_others": math.log(min(over, 1e3) / _LOOSE_OVER_OTHERS),
+        "orders": worst.count / _LOOSE_ORDERS - 1.0,
+    }
+    return (_finding(measured, worst, worst.bearing.name, "looseness", own, features),)
+
+
+def _of_shaft(measured: Measured, shaft: Shaft, levels: list[BearingLevels]) -> Finding | None:
+    """Misalignment where the harmonics rule, else unbalance."""
+    bent = max(levels, key=lambda one: one.harmonics)
+    share = bent.harmonics / max(bent.first, 1e-9)
+    if bent.harmonics >= _HARMONICS_MM_S and share >= _HARMONIC_SHARE:
+        features = {
+            "level": math.log(bent.harmonics / _HARMONICS_MM_S),
+            "share": math.log(min(share, 1e3) / _HARMONIC_SHARE),
+        }
+        return _finding(measured, bent, shaft.name, "misalignment", bent.harmonics, features)
+    heavy = max(levels, key=lambda one: one.all_round_mm_s)
+    if heavy.all_round_mm_s < _UNBALANCE_MM_S:
+        return None
+    features = {
+        "level": math.log(heavy.all_round_mm_s / _UNBALANCE_MM_S),
+        "purity": math.log(heavy.first / max(heavy.harmonics, 1e-3 * heavy.first)),
+    }
+    return _finding(measured, heavy, shaft.name, "unbalance", heavy.all_round_mm_s, features)
+
+
+def _finding(
+    measured: Measured,
+    levels: BearingLevels,
+    component: str,
+    fault: str,
+    velocity: float,
+    features: dict[str, float],
+) -> Finding:
+    ratio = measured.machine.shaft(levels.bearing.shaft).ratio
+    limit = _UNBALANCE_MM_S if fault == "unbalance" else _HARMONICS_MM_S
+    severity = (
+        "severe" if velocity >= _SEVERE_MM_S else "moderate" if velocity >= _MODERATE_MM_S else "slight"
+    )
+    evidence: dict[str, Any] = {
+        "channel": levels.channel,
+        "bearing": levels.bearing.name,
+        "velocity_mm_s": velocity,
+        "limit_mm_s": limit,
+        "order_velocities_mm_s": {
+            f"{0.5 * k:g}": round(float(v), 4) for k, v in enumerate(levels.velocity_mm_s, 1) if v > 0
+        },
+        "frequency_hz": ratio * measured.speed.value_hz,
+        "speed_source": measured.speed.source,
+        "features": features,
+    }
+    return Finding(
+        component,
+        fault,
+        ratio,
+        ratio,
+        ratio * measured.speed.value_hz,
+        20 * math.log10(velocity / limit),
+        confidence(fault, features),
+        severity,
+        levels.channel,
+        evidence,
+    )
