@@ -159,6 +159,17 @@ def test_lines_are_those_of_openconmo():
     assert noise_ours / noise_theirs == pytest.approx(1.5 / 0.92, rel=0.12)
 
 
+def test_whole_numbers_of_a_converter_are_taken_as_they_are():
+    _, x = bearing(0.4, seconds=4.0)
+    counts = np.round(200 * x).astype(np.int16)
+    ours = squared_envelope_spectrum(counts, RATE, BAND, 300.0)
+    np.testing.assert_allclose(
+        ours.power, squared_envelope_spectrum(counts.astype(np.float64), RATE, BAND, 300.0).power, rtol=1e-12
+    )
+    a, b = (cyclic_spectrum(one, RATE, 64.0, 100.0) for one in (counts, counts.astype(np.float64)))
+    np.testing.assert_array_equal(a.correlation, b.correlation)
+
+
 def test_sidebands_of_the_carrier_are_told():
     _, x = bearing(0.5, carrier=1.0)
     spectrum = squared_envelope_spectrum(x, RATE, BAND, 300.0)

@@ -48,7 +48,7 @@ def averaged_coherence(
     InputError
         As `cyclic_spectrum` does for one window, and when the record is shorter than that.
     """
-    length = round(window_s * sample_rate_hz)
+    length = round(window_s * sample_rate_hz) if np.isfinite(window_s) else 0
     if samples.ndim != 1 or not 0 < length <= samples.size:
         seconds = samples.size / sample_rate_hz
         raise InputError("averaged_coherence", "window_s", window_s, f"above 0 and at most {seconds:.4g} s")

@@ -71,7 +71,7 @@ def squared_envelope_spectrum(
     InputError
         When a window is too short to tell 32 lines up to `top`, or the band is too narrow or out of range.
     """
-    x = samples
+    x = samples if samples.dtype in (np.float32, np.float64) else samples.astype(np.float64)
     if x.ndim != 1 or not np.all(np.isfinite(x)):
         raise InputError("squared_envelope_spectrum", "samples", f"shape {x.shape}", "a finite vector")
     length = x.size if window_s is None else min(x.size, round(window_s * sample_rate_hz))
