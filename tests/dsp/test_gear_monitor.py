@@ -133,7 +133,7 @@ def test_output_does_not_depend_on_the_size_of_batches():
 @pytest.mark.parametrize(
     ("machine", "rec", "words"),
     [
-        (replace(MACHINE, gear_meshes=()), record(5.0), "lists no gear meshes"),
+        (replace(MACHINE, gear_meshes=()), record(5.0), "lists no gears"),
         (replace(MACHINE, tacho_shafts=()), noise(5.0), "no angle of the shafts in this window"),
         (
             replace(
@@ -156,6 +156,11 @@ def test_wheels_on_shafts_of_one_speed_share_a_name():
     places = places_of(load_machine("unsw_parallel"))
     assert [(p.label, p.wheels.label) for p in places] == [("input or output", "gears.pinion or gears.gear")]
     assert [p.wheels.names for p in places_of(MACHINE)] == [("gears.gear",), ("gears.pinion",)]
+    planetary = load_machine("unsw_planetary")
+    stage = planetary.planetary_stages[0]
+    (place,) = [p for p in places_of(planetary) if p.wheels and stage.name in p.wheels.names]
+    assert stage.carrier_shaft in place.shafts
+    assert stage.ring_teeth in place.wheels.teeth
 
 
 def test_thinning_keeps_the_mesh_and_its_harmonics():

@@ -23,6 +23,7 @@ from gearsim_dsp.streams.baseline import Baseline, Key, Standing, speed_step
 from gearsim_dsp.streams.baseline_keeper import BaselineKeeper
 from gearsim_dsp.streams.feature_kinds import kind_of
 from gearsim_dsp.streams.gear_window import Place, WheelsResult, analyse_wheels, places_of, thinned
+from gearsim_dsp.streams.live_names import LiveNames, looks_like
 from gearsim_dsp.streams.report import Report
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
@@ -118,6 +119,7 @@ class GearMonitor:
             machine.name, self.settings.learn_s, baseline, self.settings.learn_at_start
         )
         self._places = places_of(machine)
+        self._names = LiveNames(machine)
         self._references: dict[tuple[str, str, int], _Reference] = {}
         self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
         self._run = 0
@@ -139,6 +141,7 @@ class GearMonitor:
         if window.run != self._run:
             self._run = window.run
             self.keeper.restart()
+            self._names.reset()
         length, rate_hz = window.sample_count, window.sample_rate_hz
         speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
         if speed.phase is None:
@@ -166,17 +169,26 @@ class GearMonitor:
             frame_id=self.machine.name,
             features=tuple(self._features(window, channel, rows, speed) for channel in _channels(rows)),
             spectra=(),
-            indications=_indications(known),
+            indications=self._told(window, speed, known),
             tests=self.keeper.tests,
             judged=bool(known),
             note="" if known else why or "; ".join(fatal[:3]) or self.keeper.why_not(speed.value_hz),
             quality=tuple(quality),
         )
 
+    def _told(self, window: Window, speed: ShaftSpeed, known: list[_Row]) -> tuple[Indication, ...]:
+        """What is different, and what it looks like."""
+        found = _indications(known)
+        if not any(sign.may_raise for sign in found):
+            self._names.reset()
+            return found
+        names = self._names.of(window, speed)
+        return tuple(replace(one, words=one.words + looks_like(one.component, names)) for one in found)
+
     def _followed(self, window: Window, speed: ShaftSpeed) -> ShaftSpeed:
         """Angle and speed found in the vibration of the window, where it gives them with confidence."""
         finite = [row for row in window.data if np.isfinite(row).all() and np.ptp(row) > 0]
-        if not finite or not self.machine.gear_meshes:
+        if not finite or not any(place.wheels for place in self._places):
             return speed
         try:
             signals = np.stack(finite[:_FOLLOWED])
@@ -189,8 +201,8 @@ class GearMonitor:
         return replace(speed, note=f"no angle signal, and {doubt}")
 
     def _why_not(self, speed: ShaftSpeed) -> str:
-        if not self.machine.gear_meshes:
-            return "the nameplate lists no gear meshes: nothing can be averaged"
+        if not any(place.wheels for place in self._places):
+            return "the nameplate lists no gears: nothing can be averaged"
         if speed.phase is None:
             return f"no angle of the shafts in this window: {speed.note or 'no tacho and no encoder'}"
         return ""

@@ -69,7 +69,11 @@ class WheelsResult:
 
 
 def places_of(machine: Machine) -> tuple[Place, ...]:
-    """The shafts of a machine by speed, with the wheels of ordinary gear meshes on them."""
+    """The shafts of a machine by speed, with what meshes in their turn.
+
+    That is the wheels of ordinary meshes, and of a planetary stage with a standing ring the whole stage in
+    the turn of its carrier, where as many teeth mesh as the ring has.
+    """
     found: list[Place] = []
     for ratio in sorted({round(shaft.ratio, 9) for shaft in machine.shafts}):
         shafts = tuple(s.name for s in machine.shafts if round(s.ratio, 9) == ratio)
@@ -83,6 +87,10 @@ def places_of(machine: Machine) -> tuple[Place, ...]:
                 if shaft in shafts:
                     names.append(f"{mesh.name}.{'pinion' if shaft == small else 'gear'}")
                     teeth.append(count)
+        for stage in machine.planetary_stages:
+            if stage.carrier_shaft in shafts and not stage.ring_shaft:
+                names.append(stage.name)
+                teeth.append(stage.ring_teeth)
         wheels = Wheels(tuple(names), tuple(sorted(set(teeth)))) if names else None
         found.append(Place(shafts, ratio, wheels))
     return tuple(found)
@@ -95,9 +103,8 @@ def thinned(
 
     The averages then cost a fraction; impulses of teeth are seen through these harmonics and their sidebands.
     """
-    highest = max(
-        (m.driving_teeth * machine.shaft(m.driving_shaft).ratio for m in machine.gear_meshes), default=1.0
-    )
+    orders = [max(p.wheels.teeth) * p.ratio for p in places_of(machine) if p.wheels is not None]
+    highest = max(orders, default=1.0)
     wanted = max(_OVERSAMPLING * _MESH_HARMONICS * highest * speed_hz, _LEAST_RATE_HZ)
     factor = 2 ** max(0, math.floor(math.log2(rate_hz / wanted)))
     x = np.asarray(samples, dtype=np.float64)
