@@ -53,6 +53,24 @@ def test_the_threshold_of_one_window_is_the_quantile_of_its_law():
         assert law.threshold(p) == pytest.approx(stats.beta.isf(p, 1, 84), rel=1e-6)
 
 
+def test_a_map_for_a_picture_keeps_what_stands_out():
+    t = np.arange(round(8 * RATE)) / RATE
+    rng = np.random.default_rng(9)
+    x = rng.standard_normal(t.size) * np.sqrt(1 + 0.7 * np.cos(2 * np.pi * 41.3 * t))
+    c = cyclic_spectrum(x, RATE, 64.0, 100.0).coherence_map()
+    shown, step = c.for_picture(200)
+    assert shown.shape == (c.values.shape[0], 200)
+    there = np.mean(~np.isnan(shown[c.bins()]), axis=0)
+    assert there[int(41.3 / step)] > 0.95
+    quiet, _ = (
+        cyclic_spectrum(rng.standard_normal(t.size), RATE, 64.0, 100.0).coherence_map().for_picture(200)
+    )
+    # 12,000 places: three standard errors
+    assert np.mean(~np.isnan(quiet[c.bins(), 5:])) == pytest.approx(1e-3, abs=3 * np.sqrt(1e-3 / 12_000))
+    with pytest.raises(InputError, match="columns"):
+        c.for_picture(c.values.shape[1] + 1)
+
+
 def test_windows_of_different_speed_share_the_axis_of_orders():
     turns = turns_of(np.array([18.0, 23.0]), 8.0, RATE)
     signal = defect(np.random.default_rng(5), turns, RATE, 4.89, slip=0.0, resonance_hz=2500.0)

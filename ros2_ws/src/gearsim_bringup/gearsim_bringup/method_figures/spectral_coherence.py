@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from gearsim_bringup.method_figures.measured import Measured
@@ -21,15 +20,12 @@ def draw(records: Measured) -> Figure:
     """Squared coherence where it is above chance, and its mean over the carriers."""
     signal, rate_hz = records.signal(RECORD)
     coherence = cyclic_spectrum(signal, rate_hz, RESOLUTION_HZ, TOP_HZ).coherence_map()
-    squared = coherence.values
     figure = new_figure(f"cyclic coherence, MFPT inner-race fault, bins of {RESOLUTION_HZ:g} Hz", 5.4)
     plane, mean = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-    per_column = squared.shape[1] // _COLUMNS
-    shown = squared[:, : _COLUMNS * per_column].reshape(squared.shape[0], _COLUMNS, per_column).max(axis=2)
-    chance = coherence.threshold(1e-3 / per_column)
-    extent = (0.0, _COLUMNS * per_column * coherence.alpha_step, 0.0, rate_hz / 2e3)
+    shown, step_hz = coherence.for_picture(_COLUMNS)
+    extent = (0.0, _COLUMNS * step_hz, 0.0, rate_hz / 2e3)
     image = plane.imshow(
-        np.where(shown > chance, shown, np.nan),
+        shown,
         origin="lower",
         aspect="auto",
         extent=extent,

@@ -81,3 +81,30 @@ class CoherenceMap:
         if self.windows == 1.0:
             return float(-np.expm1(np.log(false_alarm) / (self.averages - 1.0)))
         return float(special.gammainccinv(self.windows, false_alarm) / (self.windows * self.averages))
+
+    def for_picture(self, columns: int, false_alarm: float = 1e-3) -> tuple[NDArray[np.float64], float]:
+        """The map with fewer columns, each the largest of its neighbours, NaN where noise reaches as much.
+
+        Parameters
+        ----------
+        columns : int
+            At most as many as the map has.
+        false_alarm : float
+            Probability that noise is shown at all in one column of one bin.
+
+        Returns
+        -------
+        values : ndarray of float64, shape (bins, columns)
+        step : float
+            Width of a column in `alpha_unit`; the first begins at 0.
+        """
+        count = self.values.shape[1]
+        if not 1 <= columns <= count:
+            raise InputError("CoherenceMap", "columns", columns, f"1 to {count}")
+        each = count // columns
+        groups = self.values[:, : columns * each].reshape(-1, columns, each)
+        largest = groups.max(axis=2).astype(np.float64)
+        # Columns lie half a resolution apart: half of a group's are looks of their own, its ends a bit more.
+        looks = 1.0 if each == 1 else 0.5 * each + 0.7
+        chance = self.threshold(-np.expm1(np.log1p(-false_alarm) / looks))
+        return np.where(largest > chance, largest, np.nan), each * self.alpha_step
