@@ -5,10 +5,12 @@
 """
 
 FIGURES: tuple[str, ...] = (
+    "angular_resampling",
     "autogram",
     "cepstrum",
     "deconvolution",
     "discrete_random_separation",
+    "encoders",
     "enhanced_envelope_spectrum",
     "gear_indicators",
     "gear_kinematics",
@@ -21,6 +23,7 @@ FIGURES: tuple[str, ...] = (
     "self_adaptive_noise_cancellation",
     "spectral_coherence",
     "spectral_kurtosis",
+    "speed_without_tacho",
     "squared_envelope_spectrum",
     "synchronous_average",
 )

@@ -47,7 +47,7 @@ _CARRIER_ORDERS = 64.0
 _BAND_SHARE = 0.4
 _REFINEMENTS = 4
 _FOUND = 0.5
-_WEIGHTS = (-4.96, 2.87, 2.14)
+_WEIGHTS = (-7.5, 6.5, 2.42)
 _RATE_OVER_TOP = 3.2
 _MOST_THINNING = 64
 _SAME_DB = 0.5
@@ -380,7 +380,7 @@ def _track(
 
 
 def _confidence(course: Course, comb: Comb, tracked: _Tracked) -> float:
-    """Logistic regression on 500 synthetic machines (see docs/methods/speed_without_tacho.md)."""
+    """Logistic regression on 400 synthetic machines (see docs/methods/speed_without_tacho.md)."""
     margin = 1 - course.rival / course.score if course.score > 0 else 1.0
     clear = math.log1p(max(tracked.score, 0.0) / comb.norm)
     return 1 / (1 + math.exp(-(_WEIGHTS[0] + _WEIGHTS[1] * min(margin, 0.5) + _WEIGHTS[2] * clear)))
