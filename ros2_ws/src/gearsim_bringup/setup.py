@@ -21,7 +21,7 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
-    package_data={NAME: ["bench/peers/*.txt", "monitoring/files/*.*"]},
+    package_data={NAME: ["bench/peers/*.txt", "monitoring/files/*.*", "diagnosis_report/files/*.*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -40,6 +40,8 @@ setup(
         "pydantic>=2",
         "prometheus-client>=0.20",
         "paho-mqtt>=2.1",
+        "jinja2>=3.1",
+        "markupsafe>=2.1",
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",

@@ -12,6 +12,7 @@ from gearsim_bringup.ui import Voice
 EXAMPLE = """
 ./gearsim diagnose out/demo/bag
 ./gearsim diagnose OuterRaceFault_1.mat --machine mfpt --json
+./gearsim diagnose out/demo/bag --report out/report
 """
 
 
@@ -24,6 +25,7 @@ EXAMPLE = """
     "--column", "--variable", "columns", multiple=True, help="Variable or column to take; repeatable."
 )
 @click.option("--speed", type=POSITIVE, help="Nominal speed of the reference shaft in Hz.")
+@click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for a page with the verdict and its plots.")
 @json_option
 def command(
     source: Path,
@@ -32,17 +34,28 @@ def command(
     unit: str | None,
     columns: tuple[str, ...],
     speed: float | None,
+    report: Path | None,
     json_mode: bool,
 ) -> None:
     """Diagnose a bag or a measured file with the code of the diagnostic nodes."""
+    from gearsim_bringup.diagnosis_report.folder import check_folder
     from gearsim_bringup.sources import open_source
     from gearsim_io.importers import Overrides
 
     voice = Voice(json_mode=json_mode)
+    if report is not None:
+        check_folder(report)
     record, nameplate = open_source(source, machine, Overrides(rate, unit, columns, (), speed))
     from gearsim_dsp.diagnose import diagnose_record  # after what can be refused at once
 
     diagnosis = diagnose_record(record, nameplate)
+    files: tuple[Path, ...] = ()
+    if report is not None:
+        from gearsim_bringup.diagnosis_report.write import write_report
+
+        files = write_report(report, record, nameplate, diagnosis)
     voice.result(diagnosis.to_json())
     for line in diagnosis.lines():
         voice.say(line)
+    for file in files:
+        voice.say(f"  {file}")

@@ -1,0 +1,1 @@
+"""The page of `diagnose --report`: one HTML file with the verdict, its evidence and interactive plots."""
