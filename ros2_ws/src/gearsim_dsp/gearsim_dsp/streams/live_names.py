@@ -33,17 +33,18 @@ class LiveNames:
         self._machine = machine
         self._every = every
         self._age = 0
-        self._found: tuple[Finding, ...] | None = None
+        self._found: tuple[Finding, ...] = ()
 
     def reset(self) -> None:
         """The stream began anew, or nothing is different any more."""
-        self._found = None
+        self._found = ()
 
     def of(self, window: Window, speed: ShaftSpeed) -> tuple[Finding, ...]:
         """What the judges find in this window, or found in one shortly before."""
         if not self._every:
             return ()
-        if self._found is None or self._age >= self._every:
+        # Where nothing was found the next window is looked at: the first one that differs holds both states.
+        if not self._found or self._age >= self._every:
             self._found, self._age = self._judge(window, speed), 0
         self._age += 1
         return self._found
