@@ -28,6 +28,12 @@ def test_every_page_shows_pictures_that_exist_and_are_registered(page):
         assert picture.stem in FIGURES, f"{picture.name} is made by no registered figure"
 
 
+def test_the_index_leads_to_every_page():
+    text = (DOCS / "methods" / "README.md").read_text(encoding="utf-8")
+    linked = set(re.findall(r"\]\(([\w.]+\.md)\)", text))
+    assert linked == {page.name for page in PAGES}
+
+
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_figure_has_its_page_and_a_small_picture(name):
     page = DOCS / "methods" / f"{name}.md"
