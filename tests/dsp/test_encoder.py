@@ -120,12 +120,6 @@ def test_a_disc_with_uneven_lines_is_corrected():
     assert np.std(true - angle - np.mean(true - angle)) < 1e-7
 
 
-def _fading_wave():
-    """The wave of 900 lines a second, gone for a while."""
-    k = np.arange(9000)
-    return np.cos(2 * np.pi * 900 * k / RATE) * np.clip(np.abs(k - 4500) / 1500 - 1, 0, 1)
-
-
 @pytest.mark.parametrize(
     ("call", "told"),
     [
@@ -133,7 +127,7 @@ def _fading_wave():
         (lambda: phase_from_wave(np.zeros(10), RATE, 900, 10.0), "finite samples"),
         (lambda: phase_from_wave(np.zeros(1000), RATE, 900, 30.0), "sample_rate"),
         (lambda: phase_from_wave(np.random.default_rng(1).standard_normal(9000), RATE, 90, 10.0), "carrier"),
-        (lambda: phase_from_wave(_fading_wave(), RATE, 90, 10.0), "carrier"),
+        (lambda: phase_from_wave(np.arange(1000.0), RATE, 90, 10.0), "carrier"),  # only a drift
         (lambda: line_errors(np.arange(10.0), 5), "4 turns"),
         (lambda: angular_deviation(Phase(np.array([0.0, 99.0]), np.array([0.0, 3.0])), 30), "8 turns"),
     ],
