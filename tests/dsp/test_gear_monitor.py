@@ -115,7 +115,7 @@ def test_without_a_tacho_the_angle_is_followed_in_the_vibration():
 def test_before_anything_is_learnt_it_says_so():
     watch, outcomes, _ = run(record(10.0))
     assert watch.present.stale
-    assert watch.present.note.startswith("no baseline to judge by: learning")
+    assert watch.present.note.startswith("no baseline to judge by: it is being learnt")
     assert outcomes[0].report.features
     assert not any(o.report.judged for o in outcomes)
 

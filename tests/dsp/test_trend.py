@@ -112,7 +112,7 @@ def test_it_learns_for_as_long_as_it_should_and_then_judges():
     watch = monitor()
     run(watch, [healthy(rng) for _ in range(60)])
     assert watch.present.stale
-    assert watch.present.note == "no baseline to judge by: learning 30 of 60 s"
+    assert watch.present.note == "no baseline to judge by: it is being learnt from 60 s"
     run(watch, [healthy(rng) for _ in range(61)], 60)
     assert watch.monitor.keeper.words == "learnt from 60 s"
     assert watch.monitor.keeper.baseline.tests == 2
@@ -187,6 +187,21 @@ def test_a_speed_that_was_not_learnt_is_not_judged_and_can_be_added():
     assert not any(at_20(k, 8.1) for k in range(330, 360))
     assert not watch.present.stale
     assert any(run(watch, [(9.0, 3.0)] * 12, 360))  # what was known of 10 Hz still is
+
+
+def test_a_source_that_was_not_learnt_makes_no_chatter_of_the_state():
+    """Learnt of one node alone; the other one's messages, in between, cannot be judged."""
+    rng = np.random.default_rng(12)
+    watch = monitor()
+    run(watch, [healthy(rng) for _ in range(122)])
+    due = []
+    for k in range(122, 242):
+        for source in ("kurtosis", "envelope"):
+            made = features(k, *healthy(rng), source=source)
+            due += [o.state_due for o in watch.push(made)]
+    assert sum(due) <= 1 + 6  # the note about the other source, and every ten seconds
+    assert not watch.present.stale  # one of them is judged
+    assert "learnt without indicators of envelope: learn it anew" in watch.present.note
 
 
 def test_trends_are_told_every_ten_seconds_with_limit_and_time_to_it():

@@ -135,10 +135,14 @@ class BaselineKeeper:
         """Where an alarm of that significance would be raised; NaN where none can be."""
         return math.nan if self.baseline is None else self.baseline.limit(key, step, significance)
 
-    def why_not(self, speed_hz: float) -> str:
-        """Why nothing can be judged at this speed."""
+    def why_not(self, speed_hz: float, source: str) -> str:
+        """Why nothing of a node's can be judged at this speed."""
         if self.baseline is None:
-            return f"no baseline to judge by: {self.words}"
+            # Without the progress: this is part of a state that is published whenever it changes.
+            what = f"it is being learnt from {self._wanted_s:g} s" if self.learning else self.words
+            return f"no baseline to judge by: {what}"
+        if not any(key[0] == source for key, _ in self.baseline.cells):
+            return f"the baseline was learnt without indicators of {source}: learn it anew or extend it"
         speeds = ", ".join(f"{speed:.3g}" for speed in self.baseline.speeds_hz())
         at = f"{speed_hz:.3g} Hz" if math.isfinite(speed_hz) else "an unknown speed"
         return f"no baseline at {at}: it was learnt near {speeds} Hz"

@@ -172,7 +172,9 @@ class GearMonitor:
             indications=self._told(window, speed, known),
             tests=self.keeper.tests,
             judged=bool(known),
-            note="" if known else why or "; ".join(fatal[:3]) or self.keeper.why_not(speed.value_hz),
+            note=""
+            if known
+            else why or "; ".join(fatal[:3]) or self.keeper.why_not(speed.value_hz, self.source),
             quality=tuple(quality),
         )
 

@@ -14,6 +14,8 @@ from gearsim_io.nameplate import Machine
 
 __all__ = ["AlarmedMonitor", "Monitor", "Outcome", "Report"]
 
+_MOST_NOTES = 3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Report:
@@ -119,7 +121,7 @@ class AlarmedMonitor:
         self._book: AlarmBook | None = None
         self._run = 0
         self._tests = 0
-        self._note = ""
+        self._notes: dict[str, str] = {}  # by scope: why it cannot be judged; empty where it can
 
     @property
     def assembler(self) -> WindowAssembler | None:
@@ -140,7 +142,8 @@ class AlarmedMonitor:
         if self._book is None:
             frame_id = self.monitor.machine.name
             return AlarmState(0, frame_id, self.monitor.source, Level.OK, True, "no window judged yet", 0)
-        return self._book.state(self._note, bool(self._note))
+        told = dict.fromkeys(note for note in self._notes.values() if note)
+        return self._book.state("; ".join(list(told)[:_MOST_NOTES]), all(self._notes.values()))
 
     def acknowledge(self, alarm_id: str = "", by: str = "") -> list[Alarm]:
         """Take note of an alarm, or of all; see `AlarmBook.acknowledge`."""
@@ -166,13 +169,15 @@ class AlarmedMonitor:
         book = self._book
         if book is None or report.tests != self._tests or report.frame_id != book.frame_id:
             changes += self._back(report, "the source changed")
+            self._notes.clear()
             self._book = book = self._new_book(report)
         elif report.run != self._run:
             changes += self._back(report, "the stream began again")
+            self._notes.clear()
         self._run = report.run
         note = "" if report.judged else report.note
-        news = note != self._note
-        self._note = note
+        news = note != self._notes.get(report.scope, "")
+        self._notes[report.scope] = note
         if report.judged:
             changes += book.judge(
                 Judgement(report.last_ns, report.end_sample - 1, report.indications, report.scope)

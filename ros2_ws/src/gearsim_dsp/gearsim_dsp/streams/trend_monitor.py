@@ -146,7 +146,7 @@ class TrendMonitor:
                 indications=_indications(_scope(features), features, standings) if known else (),
                 tests=self.keeper.tests,
                 judged=known,
-                note="" if known or not judged else self.keeper.why_not(features.speed_hz),
+                note="" if known or not judged else self.keeper.why_not(features.speed_hz, features.source),
                 quality=tuple[QualityIssue, ...](),
                 scope=_scope(features),
                 trends=trends,
