@@ -50,6 +50,7 @@ _FOUND = 0.5
 _WEIGHTS = (-7.5, 6.5, 2.42)
 _RATE_OVER_TOP = 3.2
 _MOST_THINNING = 64
+_MOST_CHANNELS = 3
 _SAME_DB = 0.5
 _CLEAR_BEND = 4.0
 _FREEDOM_DB = 4.0
@@ -116,7 +117,7 @@ def track_speed(
     Parameters
     ----------
     signal : ndarray, shape (n,) or (channels, n)
-        Finite values; several channels are used together.
+        Finite values; of several channels the three that show the machine's lines best are used together.
     sample_rate_hz : float
     machine : Machine
         Its shafts and meshes give the orders looked for, its nominal speed the range (5 %, or 2.5 times the
@@ -141,6 +142,7 @@ def track_speed(
     x, thinned = _thinned(x, sample_rate_hz, limits[1] * max(comb.top, _CARRIER_ORDERS))
     rate_hz = sample_rate_hz / thinned
     course = first_course(x, rate_hz, comb, limits, expected)
+    x = _clearest(x, _coarse_phase(course, x.shape[1], rate_hz), comb)
     tracked = _zoomed(x, rate_hz, comb, course)
     tracked, lines, error = _refined(x, tracked, comb, machine)
     last = float(np.atleast_2d(signal).shape[1] - 1)
@@ -199,6 +201,15 @@ def _thinned(x: NDArray[np.float64], rate_hz: float, top_hz: float) -> tuple[NDA
     if factor < 2:
         return x, 1
     return np.ascontiguousarray(decimate(x, factor, ftype="fir", axis=1)), factor
+
+
+def _clearest(x: NDArray[np.float64], phase: Phase, comb: Comb) -> NDArray[np.float64]:
+    """The three channels whose spectra over the angle show the comb best."""
+    if x.shape[0] <= _MOST_CHANNELS:
+        return x
+    signals = _over_angle(x, phase, comb.top)
+    clear = [line_score(s.values[np.newaxis], s.samples_per_turn, comb) for s in signals]
+    return x[np.sort(np.argsort(clear)[-_MOST_CHANNELS:])]
 
 
 def _coarse_phase(course: Course, samples: int, rate_hz: float) -> Phase:
