@@ -25,7 +25,7 @@ EXAMPLE = """
     "--column", "--variable", "columns", multiple=True, help="Variable or column to take; repeatable."
 )
 @click.option("--speed", type=POSITIVE, help="Nominal speed of the reference shaft in Hz.")
-@click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for a page with the verdict and its plots.")
+@click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for a page with verdict and plots.")
 @json_option
 def command(
     source: Path,

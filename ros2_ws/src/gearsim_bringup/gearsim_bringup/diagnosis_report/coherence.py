@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_bringup.diagnosis_report.lines import expected_marks, finding_marks, shaft_words
+from gearsim_bringup.diagnosis_report.lines import expected_marks, finding_marks
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
 from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, comb, curve, packed, strongest
+from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.band_choice import usable_ceiling_hz
 from gearsim_dsp.cyclic.averaging import averaged_coherence
 

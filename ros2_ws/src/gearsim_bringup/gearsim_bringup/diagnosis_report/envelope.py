@@ -13,10 +13,10 @@ from gearsim_bringup.diagnosis_report.lines import (
     expected_marks,
     finding_marks,
     shaft_marks,
-    shaft_words,
 )
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
 from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, Plot, axis, comb, curve, strongest
+from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.cyclic.envelope_spectra import squared_envelope_spectrum
 from gearsim_dsp.cyclic.modulation import ModulationSpectrum

@@ -8,7 +8,7 @@ from typing import Literal
 
 from gearsim_bringup.diagnosis_report.material import BEARING_FAULTS, Material
 from gearsim_bringup.diagnosis_report.plot import FOUND, GREEN, GREY, ORANGE
-from gearsim_bringup.diagnosis_report.words import fault_name
+from gearsim_bringup.diagnosis_report.words import fault_name, shaft_words
 from gearsim_dsp.decide import Finding
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "finding_marks",
     "gear_marks",
     "shaft_marks",
-    "shaft_words",
 ]
 
 _HARMONICS = 8
@@ -37,11 +36,6 @@ class Marks:
     colour: str
     dash: str
     visible: bool | Literal["legendonly"] = True
-
-
-def shaft_words(name: str) -> str:
-    """Such as "shaft input", but not "shaft shaft"."""
-    return name if name.startswith("shaft") else f"shaft {name}"
 
 
 def all_marks(material: Material) -> Iterator[Marks]:
@@ -89,6 +83,12 @@ def gear_marks(material: Material) -> Iterator[Marks]:
             yield Marks(name, tuple(p for p in places if p > 0), ORANGE, "dot", "legendonly")
 
 
+def _few(components: str) -> str:
+    """Names as they are, or their number where they would fill the legend."""
+    names = components.split(", ")
+    return components if len(names) <= 2 else f"of {len(names)} bearings"
+
+
 def expected_marks(
     material: Material, harmonics: int, visible: bool | Literal["legendonly"] = "legendonly"
 ) -> Iterator[Marks]:
@@ -99,4 +99,6 @@ def expected_marks(
         if any((name, words.get(label, "")) in found for name in components.split(", ")):
             continue
         places = tuple(k * order for k in range(1, harmonics + 1))
-        yield Marks(f"{label} {components}", places, _FAMILY_COLOURS.get(label, GREY), "dashdot", visible)
+        yield Marks(
+            f"{label} {_few(components)}", places, _FAMILY_COLOURS.get(label, GREY), "dashdot", visible
+        )

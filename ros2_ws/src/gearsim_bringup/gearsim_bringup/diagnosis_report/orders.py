@@ -7,9 +7,10 @@ import math
 import numpy as np
 from scipy import fft as sfft
 
-from gearsim_bringup.diagnosis_report.lines import all_marks, shaft_words
+from gearsim_bringup.diagnosis_report.lines import all_marks
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
 from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, comb, curve, strongest
+from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.angle.resample import to_angle
 from gearsim_io.errors import InputError
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft as sfft
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, Plot, axis, curve
+from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, SERIES, Plot, axis, curve
 from gearsim_dsp.angle.resample import full_rate
 from gearsim_dsp.decide import Finding
 from gearsim_dsp.gear_kinematics import GearWheel, gear_wheels
@@ -84,35 +83,42 @@ def _wheel_of(material: Material, finding: Finding) -> GearWheel | None:
     return next(iter(own or [one for one in wheels if one.mesh == finding.component]), None)
 
 
-def _planet(material: Material, finding: Finding, colour: str) -> Plot | None:
+def _planet(material: Material, finding: Finding, colour: str) -> Plot:
     stage, folded = _folded(material, finding)
-    profile = folded.profile
-    step = stage.planet_teeth / profile.size
-    top = 1.15 * float(profile.max())
-    at = float(np.argmax(profile)) * step
-    opposite = math.fmod(at + stage.planet_teeth / 2, stage.planet_teeth)
-    data = (curve(profile, 0.0, step, "energy of the residual", BLUE, width=1.6),)
-    shapes = [_stripe(place - 0.8, place + 0.8, colour) for place in (at, opposite)]
+    clearest = next((one for one in folded if one.channel == finding.channel), folded[0])
+    # The tooth is put at a quarter of the turn, so that it and its opposite lie within the picture.
+    size = clearest.profile.size
+    shift = size // 4 - int(np.argmax(clearest.profile))
+    step = stage.planet_teeth / size
+    top = 1.15 * max(float(one.profile.max()) for one in folded)
+    data = tuple(
+        curve(np.roll(one.profile, shift), 0.0, step, one.channel, SERIES[row % len(SERIES)], width=1.6)
+        for row, one in enumerate(folded)
+    )
+    places = (0.25 * stage.planet_teeth, 0.75 * stage.planet_teeth)
     layout = {
         "xaxis": axis("turn of the planet against the carrier, teeth", 0.0, float(stage.planet_teeth)),
         "yaxis": axis("energy over its median", 0.0, top),
-        "shapes": shapes,
-        "showlegend": False,
+        "shapes": [_stripe(place - 0.8, place + 0.8, colour) for place in places],
+        "showlegend": len(folded) > 1,
     }
+    turns = clearest.energy.shape[0]
     caption = (
-        f"What a linear prediction leaves of channel {folded.channel}, folded over {folded.energy.shape[0]} "
-        "turns of the planet. Shaded: the tooth that stands out and the place half a turn from it. One "
-        "peak is a spall, which only one mesh feels; two are a crack, which both meshes feel."
+        f"What a linear prediction leaves of the channels, folded over {turns} turns of the planet. Shaded: "
+        "the tooth that stands out and the place half a turn from it. One peak is a spall, which only one "
+        "mesh feels; two, on one channel or several, are a crack, which both meshes feel."
     )
     return Plot("One turn of the planet", caption, data, layout)
 
 
-def _folded(material: Material, finding: Finding) -> tuple[PlanetaryStage, FoldedResidual]:
+def _folded(material: Material, finding: Finding) -> tuple[PlanetaryStage, list[FoldedResidual]]:
     measured = Measured.of_record(material.record, material.machine, material.turning)
-    for stage in material.machine.planetary_stages:
-        for folded in fold_stage(measured, stage):
-            if folded.channel == finding.channel:
-                return stage, folded
+    stages = material.machine.planetary_stages
+    own = [stage for stage in stages if finding.component.startswith(f"{stage.name}.")]
+    for stage in own or stages:
+        folded = fold_stage(measured, stage)
+        if folded:
+            return stage, folded
     raise InputError("one turn of the planet", "channel", finding.channel, "a channel with enough turns")
 
 
@@ -135,7 +141,7 @@ def _velocities(finding: Finding, colour: str) -> Plot:
             {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": limit, "y1": limit, "line": line}
         )
     layout = {
-        "xaxis": axis(f"order of the shaft at {finding.component}", 0.0, 8.5, dtick=1),
+        "xaxis": axis("order of the shaft", 0.0, 8.5, dtick=1),
         "yaxis": axis("velocity, mm/s RMS", rangemode="tozero"),
         "shapes": shapes,
         "showlegend": False,

@@ -21,10 +21,12 @@ __all__ = ["draw_trend", "fault_level"]
 
 _MOST_WINDOWS = 40
 _LEAST_S = 0.1
-_TURNS = 5.0
+_TURNS = 3.0
 _BLOWS = 12.0
 _HARMONICS = 4
 _MOST_CHANNELS = 8
+_SPEED = "speed, Hz"
+_LEAST_SPAN = 0.005
 
 
 def draw_trend(material: Material) -> Plot:
@@ -59,7 +61,7 @@ def draw_trend(material: Material) -> Plot:
     if angle is not None:
         turns = np.interp(edges, angle.samples, angle.turns)
         speeds = np.diff(turns) / np.diff(edges) * material.rate_hz
-        rows.append(("speed, Hz", [_trace(middle, speeds.tolist(), "speed", BLUE, False)]))
+        rows.append((_SPEED, [_trace(middle, speeds.tolist(), "speed", BLUE, False)]))
     data, layout = _stacked(rows, material.record.seconds)
     window = (edges[1] - edges[0]) / material.rate_hz
     fault = (
@@ -127,6 +129,13 @@ def _trace(x: NDArray[np.floating], y: list[float], name: str, colour: str, told
     }
 
 
+def _around(values: list[float]) -> tuple[float, float]:
+    """Ends of the axis of speed, half a per cent either way at least: jitter is not to look like a change."""
+    low, high = min(values), max(values)
+    room = max(0.1 * (high - low), _LEAST_SPAN * high)
+    return low - room, high + room
+
+
 def _stacked(
     rows: list[tuple[str, list[dict[str, Any]]]], seconds: float
 ) -> tuple[list[dict[str, Any]], dict[str, Any]]:
@@ -137,9 +146,9 @@ def _stacked(
         number = "" if row == 0 else str(row + 1)
         data += [{**trace, "yaxis": f"y{number}"} for trace in traces]
         top = 1.0 - row * share
-        layout[f"yaxis{number}"] = axis(title, domain=[top - 0.82 * share, top], nticks=4, rangemode="tozero")
-        if title == "speed, Hz":
-            layout[f"yaxis{number}"]["rangemode"] = "normal"
+        ends = _around(traces[0]["y"]) if title == _SPEED else ()
+        more = {} if ends else {"rangemode": "tozero"}
+        layout[f"yaxis{number}"] = axis(title, *ends, domain=[top - 0.82 * share, top], nticks=4, **more)
     last = "" if len(rows) == 1 else str(len(rows))
     layout["xaxis"] = axis("time, s", 0.0, seconds, anchor=f"y{last}")
     return data, layout

@@ -56,7 +56,7 @@ def draw_waveform(material: Material) -> Plot:
         "time, s", 0.0, material.record.seconds, anchor=f"y{len(names)}".replace("y1", "y")
     )
     rest = f" The first {len(names)} of {len(fit)} channels." if len(fit) > len(names) else ""
-    spread = "" if len(names) == 1 else " Every channel has a scale of its own."
+    spread = "" if len(names) == 1 else f" In {material.unit}; every channel has a scale of its own."
     caption = (
         "The whole record: for every moment the least and the greatest value, so no peak is lost. Look for "
         f"single knocks, changes of level, and flat tops of a signal that ran into its limits.{spread}{rest}"

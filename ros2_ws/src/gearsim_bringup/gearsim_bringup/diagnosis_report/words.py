@@ -22,6 +22,7 @@ __all__ = [
     "meaning",
     "record_line",
     "record_rows",
+    "shaft_words",
 ]
 
 Row = tuple[str, ...]
@@ -59,12 +60,20 @@ _NAMES = {
 }
 _SEVERITIES = ("slight", "moderate", "severe")
 _LEAST_DB = 6.0
+_SAME = 1e-4
 
 
 def fault_name(finding: Finding) -> str:
     """Such as "damaged outer race, bearing_1"."""
     what = _NAMES.get(finding.fault, finding.fault.replace("_", " "))
+    if finding.fault in ("unbalance", "misalignment"):
+        return f"{what}, {shaft_words(finding.component)}"
     return f"{what}, {finding.component}" if finding.component else what
+
+
+def shaft_words(name: str) -> str:
+    """Such as "shaft input", but not "shaft shaft"."""
+    return name if name.startswith("shaft") else f"shaft {name}"
 
 
 def meaning(finding: Finding) -> str:
@@ -200,39 +209,46 @@ def evidence_rows(material: Material, finding: Finding) -> list[Row]:
 
 
 def family_rows(material: Material) -> list[Row]:
-    """Every family of the bearings: where it is expected, and how much of it there is."""
-    rows: list[Row] = []
+    """Every family of the bearings: where it is expected, how much of it there is; like ones in one row."""
     found = {(one.component, one.fault) for one in material.diagnosis.findings}
+    together: dict[Row, list[str]] = {}
     for one in material.evidence():
-        key = (one.family.component, one.family.fault)
-        state = "found" if key in found else _state(one)
         hertz = one.family.order * material.speed_hz
-        rows.append(
-            (
-                one.family.component,
-                f"{one.family.fault.replace('_', ' ')} ({one.family.label})",
-                f"{one.family.order:.4f}",
-                f"{hertz:.2f}" if math.isfinite(hertz) else "not known",
-                f"{one.snr_db:.0f}",
-                _chance(one.false_alarm_probability),
-                f"{one.modulation:.3f}",
-                state,
-            )
+        state = "found" if (one.family.component, one.family.fault) in found else _state(material, one)
+        row = (
+            f"{one.family.fault.replace('_', ' ')} ({one.family.label})",
+            f"{one.family.order:.4f}",
+            f"{hertz:.2f}" if math.isfinite(hertz) else "not known",
+            f"{one.snr_db:.0f}",
+            _chance(one.false_alarm_probability),
+            f"{one.modulation:.3f}",
+            state,
         )
-    return rows
+        together.setdefault(row, []).append(one.family.component)
+    return [(", ".join(components), *row) for row, components in together.items()]
 
 
-def _state(one: FamilyEvidence) -> str:
+def _state(material: Material, one: FamilyEvidence) -> str:
+    if any(
+        finding.fault == one.family.fault and abs(finding.expected_order / one.family.order - 1.0) < _SAME
+        for finding in material.diagnosis.findings
+        if finding.expected_order
+    ):
+        return "the same lines, louder at the bearing found"
     if one.false_alarm_probability >= ALARM_PROBABILITY:
         return "nothing"
-    return "weak" if one.modulation < MODULATION_LIMIT else "explained by others"
+    return "weak" if one.modulation < MODULATION_LIMIT else "belongs to other lines"
+
+
+def _small(percent: float) -> str:
+    return f"{percent:.2g}" if percent >= 1e-3 else "less than 0.001"
 
 
 def record_line(material: Material) -> str:
     """The measurement in one line below the machine's name."""
     record, speed = material.record, material.speed_hz
     name = PurePath(material.diagnosis.source).name or "record"
-    turning = f", {60 * speed:.0f} 1/min" if math.isfinite(speed) else ""
+    turning = f", {60 * speed:.0f} rpm" if math.isfinite(speed) else ""
     count = len(record.channels)
     return f"{name}: {record.seconds:.2f} s of {count} channel{'s' if count > 1 else ''}{turning}"
 
@@ -258,7 +274,7 @@ def record_rows(material: Material) -> list[Row]:
         rows.append(
             (
                 "speed of " + material.machine.reference_shaft,
-                f"{speed.value_hz:.3f} Hz = {per_minute:.1f} 1/min ± {half:.2g} %, {source}",
+                f"{speed.value_hz:.3f} Hz = {per_minute:.1f} rpm ± {_small(half)} %, {source}",
             )
         )
     else:
