@@ -1,0 +1,1 @@
+"""How large a fault is: widths of spalls from the way rolling elements cross them."""
