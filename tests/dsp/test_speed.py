@@ -46,6 +46,35 @@ def test_double_pulses_are_dropped():
     assert track.note == "4 double pulses dropped"
 
 
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.45])
+def test_many_missing_and_double_pulses_are_counted_right(share):
+    turns = turns_of(np.array([20.0, 24.0]), 8.0, RATE)
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        pulses = _pulses(turns)
+        there = rng.random(pulses.size) > share
+        seen = pulses[there] + 0.5 * rng.standard_normal(there.sum())
+        doubles = seen[rng.random(seen.size) < 0.05] + rng.uniform(5, 60)
+        track = phase_from_pulses(np.sort(np.concatenate((seen, doubles))), 1.0, turns.size)
+        first, last = np.flatnonzero(there)[[0, -1]]
+        missing = last - first + 1 - there.sum()
+        dropped = f"{doubles.size} double pulses dropped, " if doubles.size else ""
+        assert track.note == f"{dropped}{missing} missing pulses filled in"
+        # Straight lines over the longest gap at 0.5 Hz/s, and four deviations of the jitter.
+        gap_s = np.max(np.diff(pulses[there])) / RATE
+        assert _error(track, turns) < 0.5 * gap_s**2 / 8 + 4 * 0.5 / RATE * 24
+
+
+def test_a_wheel_with_two_teeth_left_out_is_counted_right():
+    turns = turns_of(np.array([10.0, 11.0]), 4.0, RATE)
+    pulses = _pulses(turns, 60.0)
+    tooth = np.arange(pulses.size) % 60
+    track = phase_from_pulses(pulses[tooth < 58], 60.0, turns.size)
+    assert _error(track, turns) < 1e-4
+    assert "missing pulses filled in" in track.note
+    assert "double" not in track.note
+
+
 def test_missing_and_double_pulses_on_a_ramp():
     turns = turns_of(np.array([8.0, 12.0]), 4.0, RATE)
     pulses = _pulses(turns)

@@ -84,3 +84,17 @@ def test_a_nameplate_that_is_off_is_corrected(error):
     speed = _estimate(x, machine(25.0 / (1 + error)))
     assert speed.source == "estimated"
     assert speed.value_hz == pytest.approx(25.0, rel=1e-3)
+
+
+def test_the_mesh_of_a_planetary_stage_sharpens_the_estimate():
+    plate = load_machine("unsw_planetary")
+    stage = plate.planetary_stages[0]
+    order = stage.ring_teeth * plate.shaft(stage.carrier_shaft).ratio
+    nominal = plate.nominal_speed_hz
+    turns = turns_of(1.008 * nominal, 8.0, RATE)
+    lines = {order: 0.5, 2 * order: 0.3, 3 * order: 0.2, 1: 0.3, 2: 0.2}
+    x = noise(np.random.default_rng(8), turns.size) + rotating_lines(turns, lines)
+    speed = _estimate(x, plate, 4.0)
+    assert speed.source == "estimated"
+    # A tenth of a line of the mesh: 0.025 Hz in 172; of the shaft's own lines it would be 6e-3.
+    assert speed.value_hz == pytest.approx(1.008 * nominal, rel=1.5e-4)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from gearsim_dsp.angle.pulse_counting import count_pulses
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import PulseTrain
@@ -18,7 +19,6 @@ __all__ = ["Phase", "ShaftSpeed", "SpeedSource", "nameplate_speed", "phase_from_
 
 SpeedSource = Literal["tacho", "encoder", "estimated", "nameplate"]
 
-_BOUNCE = 0.4
 _LOCAL_INTERVALS = 9
 _DOUBT = 0.25
 _END_PULSES = 8
@@ -146,49 +146,43 @@ def phase_from_pulses(
     sample_count : int
 
     Returns
-    ------- phase with the jitter of the pulses in samples (root mean square) and a note; None with fewer
-    than two pulses.
+    -------
+    track or None
+        `phase`, the jitter of the pulses in samples (root mean square), and a note; None with fewer than two
+        pulses.
 
     Notes
     -----
-    An interval below 0.4 of the local median is a bounce: its later pulse is dropped. An interval near a
-    multiple of the local median has swallowed pulses: the angle is counted on by that multiple. Beyond the
-    first and last pulse the angle goes on along the parabola through the eight pulses next to the end.
+    A train in which each interval is near the median of its neighbours is taken as it is. In any other,
+    doubles are left out and missing pulses counted on by following the interval of one pulse
+    (`angle.pulse_counting`). Beyond the first and last pulse the angle goes on along the parabola through
+    the eight pulses next to the end.
     """
     kept = np.asarray(pulse_samples, dtype=np.float64)
-    kept, dropped = _without_bounces(kept)
     if kept.size < 2:
         return None
-    intervals = np.diff(kept)
-    local = _local_median(intervals)
-    # The median itself may stand for two: a count is relative to the shortest interval that is not a bounce.
-    counts = np.maximum(1.0, np.round(intervals / local))
-    doubtful = int(np.count_nonzero(np.abs(intervals / local - counts) > _DOUBT))
-    turns = np.concatenate(([0.0], np.cumsum(counts))) / pulses_per_turn
-    per_pulse = intervals / counts
+    counts = np.ones(kept.size - 1)
     notes = []
-    if dropped:
-        notes.append(f"{dropped} double pulses dropped")
-    if missing := int(np.sum(counts - 1)):
-        notes.append(f"{missing} missing pulses filled in")
-    if doubtful:
-        notes.append(f"{doubtful} intervals fit no whole number of pulses")
+    if _irregular(np.diff(kept)):
+        counted = count_pulses(kept)
+        kept, counts = counted.samples, counted.counts
+        if kept.size < 2:
+            return None
+        if counted.dropped:
+            notes.append(f"{counted.dropped} double pulses dropped")
+        if counted.missing:
+            notes.append(f"{counted.missing} missing pulses filled in")
+        if counted.doubtful:
+            notes.append(f"{counted.doubtful} intervals fit no whole number of pulses")
+    turns = np.concatenate(([0.0], np.cumsum(counts))) / pulses_per_turn
+    per_pulse = np.diff(kept) / counts
     samples, turns = _extended(kept, turns, sample_count)
     return _Track(Phase(samples, turns), _jitter(per_pulse), ", ".join(notes))
 
 
-def _without_bounces(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    dropped = 0
-    while samples.size >= 3:
-        intervals = np.diff(samples)
-        short = intervals < _BOUNCE * _local_median(intervals)
-        if not np.any(short):
-            break
-        first = np.flatnonzero(short)
-        first = first[np.concatenate(([True], np.diff(first) > 1))]
-        samples = np.delete(samples, first + 1)
-        dropped += int(first.size)
-    return samples, dropped
+def _irregular(intervals: NDArray[np.float64]) -> bool:
+    """True when an interval differs from the median of those around it by more than a quarter."""
+    return bool(np.any(np.abs(intervals / _local_median(intervals) - 1) > _DOUBT))
 
 
 def _local_median(intervals: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_dsp.kinematics import mesh_orders
+from gearsim_dsp.angle.tracked_orders import all_mesh_orders
 from gearsim_dsp.noise_floor import LineTail, comb_false_alarm, local_floor
 from gearsim_dsp.speed import ShaftSpeed, nameplate_speed
 from gearsim_io.nameplate import Machine
@@ -40,7 +40,7 @@ _WIDE_HZ = (4.0, 65.0)
 def shaft_line_orders(machine: Machine) -> NDArray[np.float64]:
     """Orders at which a sound machine has lines: harmonics of the shafts, gear meshes and their harmonics."""
     orders = {round(n * s.ratio, 9) for s in machine.shafts for n in range(1, _SHAFT_HARMONICS + 1)}
-    orders |= {round(k * m, 9) for m in mesh_orders(machine).values() for k in range(1, _MESH_HARMONICS + 1)}
+    orders |= {round(k * m, 9) for m in all_mesh_orders(machine) for k in range(1, _MESH_HARMONICS + 1)}
     return np.array(sorted(orders))
 
 
