@@ -65,6 +65,15 @@ def test_many_missing_and_double_pulses_are_counted_right(share):
         assert _error(track, turns) < 0.5 * gap_s**2 / 8 + 4 * 0.5 / RATE * 24
 
 
+def test_pulses_halfway_between_the_true_ones_are_no_finer_wheel():
+    turns = turns_of(10.0, 8.0, RATE)
+    pulses = _pulses(turns)
+    halves = 0.5 * (pulses[3:-1:10] + pulses[4::10])
+    track = phase_from_pulses(np.sort(np.concatenate((pulses, halves))), 1.0, turns.size)
+    assert track.note == f"{halves.size} double pulses dropped"
+    assert _error(track, turns) < 1e-6
+
+
 def test_a_wheel_with_two_teeth_left_out_is_counted_right():
     turns = turns_of(np.array([10.0, 11.0]), 4.0, RATE)
     pulses = _pulses(turns, 60.0)
