@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from gearsim_bringup.diagnosis_report.folder import check_folder, placed
-from gearsim_bringup.diagnosis_report.page import PLOTLY, make_page
-from gearsim_bringup.diagnosis_report.plot import extremes, packed, strongest
+from gearsim_bringup.diagnosis_report.page import PLOTLY, make_page, script_safe
+from gearsim_bringup.diagnosis_report.plot import axis, extremes, packed, strongest
 from gearsim_bringup.diagnosis_report.trend import fault_level
 from gearsim_bringup.diagnosis_report.write import PAGE, VERDICT, write_report
 from gearsim_dsp.diagnose import Diagnosis, diagnose_record
@@ -211,6 +211,13 @@ def test_names_cannot_break_out(simulated):
     assert bad not in page
     assert html.escape(bad) in page
     assert _plots(page)["Vibration over time"]["data"][0]["name"] == html.escape(bad)
+
+
+def test_numbers_and_labels_cannot_break_out():
+    whole = {"name": "</script><!--"}
+    assert "<" not in script_safe(whole)
+    assert json.loads(script_safe(whole)) == whole
+    assert axis("order of <b>")["title"]["text"] == "order of &lt;b&gt;"
 
 
 def test_the_bundle_is_the_one_released():

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from gearsim_bringup.bench import angle, cyclic, separation, synchronous
 from gearsim_bringup.bench.clock import alternate, cpu_seconds
 from gearsim_bringup.bench.figure import Figure, Goal
+from gearsim_bringup.diagnosis_report.material import Material
+from gearsim_bringup.diagnosis_report.page import make_page
 from gearsim_bringup.ui import Voice
 from gearsim_dsp.diagnose import diagnose_record
 from gearsim_dsp.kurtogram import fast_kurtogram
@@ -23,7 +25,7 @@ LEVELS = 7
 
 
 def measure(_voice: Voice) -> Iterator[Figure]:
-    """Kurtogram, envelope spectra and coherence, separation, and the diagnosis of a record of one channel."""
+    """Kurtogram, envelope spectra, coherence, separation; diagnosis and report of a record of one channel."""
     signal = _signal()
     single = signal.astype(np.float32)  # what records and streams hold
     try:
@@ -44,6 +46,9 @@ def measure(_voice: Voice) -> Iterator[Figure]:
     record = Record(RATE_HZ, (machine.channels[0].name,), "m/s^2", single[None, :])
     whole = cpu_seconds(lambda: diagnose_record(record, machine), 2)
     yield Figure("diagnose.record_s", whole, "s", Goal("<=", 4.0), ("the record's duration", SECONDS))
+    diagnosis = diagnose_record(record, machine)
+    page = cpu_seconds(lambda: make_page(Material.of(record, machine, diagnosis)), 2)
+    yield Figure("diagnose.report_s", page, "s", Goal("<=", 4.0), ("the record's diagnosis", whole))
 
 
 def _signal() -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ from gearsim_bringup.diagnosis_report.waveform import draw_blows, draw_waveform
 from gearsim_dsp.decide import Finding
 from gearsim_io.errors import InputError
 
-__all__ = ["PLOTLY", "make_page"]
+__all__ = ["PLOTLY", "make_page", "script_safe"]
 
 PLOTLY = "plotly-cartesian-4.1.1.min.js"
 """The bundle with the chart types of two axes, of the npm package plotly.js-cartesian-dist-min."""
@@ -133,10 +133,10 @@ def _shown(key: str, title: str, draw: Callable[[], Plot | None]) -> _Shown:
     if plot is None:
         return _Shown(key, title, "")
     spec: dict[str, Any] = {"data": plot.data, "layout": plot.layout}
-    return _Shown(key, plot.title, plot.caption, plot.height, _script_safe(spec))
+    return _Shown(key, plot.title, plot.caption, plot.height, script_safe(spec))
 
 
-def _script_safe(content: object) -> Markup:
+def script_safe(content: object) -> Markup:
     """JSON that cannot end the element it stands in."""
     whole = json.dumps(content, allow_nan=False, separators=(",", ":"))
     return Markup(whole.replace("<", "\\u003c"))

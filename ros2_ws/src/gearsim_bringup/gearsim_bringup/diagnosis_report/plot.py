@@ -76,7 +76,7 @@ def text(words: str) -> str:
 
 def axis(title: str, low: float | None = None, high: float | None = None, **more: Any) -> dict[str, Any]:
     """An axis; `low` and `high` are in its unit, also where `type` is "log"."""
-    found: dict[str, Any] = {"title": {"text": title}, **more}
+    found: dict[str, Any] = {"title": {"text": text(title)}, **more}
     if low is not None and high is not None:
         ends = np.log10([low, high]) if more.get("type") == "log" else [low, high]
         found["range"] = [float(end) for end in ends]
