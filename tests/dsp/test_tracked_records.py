@@ -7,6 +7,7 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 from gearsim_dsp.angle.record_speed import changes, record_speed
 from gearsim_dsp.angle.resample import to_angle
 from gearsim_dsp.angle.tacholess import track_speed
+from gearsim_dsp.diagnose import diagnose_record
 from gearsim_dsp.noise_floor import local_floor
 from gearsim_dsp.speed import Phase
 from gearsim_io.importers import import_file
@@ -46,6 +47,14 @@ def test_a_turbine_that_slows_by_four_percent_is_followed(record_file):
     found = np.interp(seconds, track.time_s, track.speed_hz)
     assert found[inner] == pytest.approx(mesh_hz[inner] / 22, rel=2e-3)
     assert track.speed_hz[0] / track.speed_hz[-1] - 1 == pytest.approx(0.045, abs=0.005)
+
+
+def test_the_diagnosis_of_the_turbine_rests_on_the_speed_followed(record_file):
+    record, track = _tracked(record_file, TURBINE, "wt_hss")
+    diagnosis = diagnose_record(record, load_machine("wt_hss"))
+    assert diagnosis.speed.source == "estimated"
+    assert diagnosis.speed.value_hz == pytest.approx(track.mean_hz, rel=1e-6)
+    assert diagnosis.findings == ()
 
 
 def test_a_turbines_orders_are_sharp_after_tracking(record_file):

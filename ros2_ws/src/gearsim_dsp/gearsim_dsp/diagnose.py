@@ -182,7 +182,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         findings = (strange,) if strange else ()
     quality = (*angle.issues, *notes, *electrical, *(() if findings else _unexplained(verdict, impulsive)))
     return Diagnosis(
-        verdict.speed,
+        speed if angle.replaces_angle else verdict.speed,
         tuple(dict.fromkeys(quality)),
         findings,
         plate.name,
