@@ -173,7 +173,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     speed = angle.speed or verdict.speed
     # A wrong angle signal is not to be read again.
     sound = replace(record, tachos=(), encoders=()) if angle.replaces_angle else record
-    measured = Measured.of_record(sound, plate, speed, _unfit(notes))
+    measured = Measured.of_record(sound, plate, speed)
     findings = all_findings(measured, verdict.findings)
     electrical = _electrical_notes(record, plate, verdict, findings)
     if not findings:
@@ -190,11 +190,6 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         verdict,
         _judged_parts(measured, verdict),
     )
-
-
-def _unfit(notes: list[QualityIssue]) -> frozenset[str]:
-    """Channels that are constant, broken or not finite."""
-    return frozenset(note.channel for note in notes if note.fatal and note.channel)
 
 
 def _judged_parts(measured: Measured, verdict: Verdict) -> tuple[str, ...]:

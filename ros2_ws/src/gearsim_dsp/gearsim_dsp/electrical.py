@@ -2,7 +2,8 @@
 
 The supply's lines lie at whole multiples of 50 or 60 Hz, to within the 0.2 % that grids keep. An
 inverter's carrier is a strong, narrow line in the kilohertz range that comes with its double, both
-unrelated to the shafts.
+unrelated to the shafts, and stands alone: lines of gears that a resonance lifts come in numbers, a shaft's
+speed apart. Lines that are nothing beside the signal are leakage and rounding, not electricity.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ _CARRIER_DB = 30.0
 _DOUBLE_DB = 20.0
 _CARRIER_GRID_HZ = 500.0
 _CARRIER_ERROR = 5e-4
+_ALONE_HZ = 45.0
+_ALONE_DB = 12.0
+_LEAST_SHARE = 1e-9  # of a carrier in the signal's power
 _LONGEST = 1 << 20
 _BLOCK_LINES = 256
 
@@ -79,7 +83,7 @@ def find_electrical_lines(
     return ElectricalLines(
         supplies[best] if enough else 0.0,
         tuple(found[best]) if enough else (),
-        tuple(_carriers(height_db, step_hz, known)),
+        tuple(_carriers(height_db, power / max(float(power.sum()), 1e-300), step_hz, known)),
     )
 
 
@@ -127,15 +131,29 @@ def _peaks(height_db: NDArray[np.float64], least_db: float) -> NDArray[np.float6
     return np.asarray(at + 1 + np.clip(0.5 * (right[at] - left[at]) / curve, -0.5, 0.5))
 
 
-def _carriers(height_db: NDArray[np.float64], step_hz: float, known: _Known) -> list[float]:
-    """Strong narrow lines at multiples of 500 Hz that come with their doubles."""
+def _carriers(
+    height_db: NDArray[np.float64], share: NDArray[np.float64], step_hz: float, known: _Known
+) -> list[float]:
+    """Strong narrow lines at multiples of 500 Hz that stand alone and come with their doubles."""
     found = []
     for place in _peaks(height_db, _CARRIER_DB) * step_hz:
         setting = max(3, round(place / _CARRIER_GRID_HZ)) * _CARRIER_GRID_HZ
         if abs(place - setting) > _CARRIER_ERROR * setting or known.explains(float(place)):
+            continue
+        line = round(place / step_hz)
+        if share[line - 1 : line + 2].sum() < _LEAST_SHARE or not _alone(height_db, line, step_hz):
             continue
         double = round(2 * place / step_hz)
         around = height_db[double - 2 : double + 3]
         if around.size and around.max() >= _DOUBLE_DB:
             found.append(float(place))
     return found
+
+
+def _alone(height_db: NDArray[np.float64], line: int, step_hz: float) -> bool:
+    """True when nothing within 45 Hz, but for the line's own skirt, comes within 12 dB of it."""
+    reach, skirt = max(8, round(_ALONE_HZ / step_hz)), 4
+    low = height_db[max(0, line - reach) : max(0, line - skirt)]
+    high = height_db[line + skirt + 1 : line + reach + 1]
+    top = float(height_db[max(0, line - 1) : line + 2].max())
+    return max(low.max(initial=-np.inf), high.max(initial=-np.inf)) < top - _ALONE_DB

@@ -44,6 +44,7 @@ def command(
     """Simulate random machines with and without faults, diagnose them, and count what is right."""
     from gearsim_bringup.evaluation.fit import fit_all
     from gearsim_bringup.evaluation.page import evaluation_page, summary
+    from gearsim_bringup.evaluation.rejudge import rejudged
     from gearsim_bringup.evaluation.run import evaluate, read_results
 
     voice = Voice(json_mode=json_mode)
@@ -57,10 +58,12 @@ def command(
     if fit:
         for line in fit_all(everything, f"gearsim evaluate --fit, {len(everything)} results in {out.name}"):
             voice.say(line)
+        voice.result({"fitted": len(everything)})
+        return
     if page is not None:
         page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(evaluation_page(everything))
-    numbers = summary(results)
+        page.write_text(evaluation_page([rejudged(one) for one in everything]))
+    numbers = summary([rejudged(one) for one in results])
     for name, value in numbers.items():
         voice.say(f"{name.replace('_', ' ')}: {value:.4g}")
     voice.result(numbers)

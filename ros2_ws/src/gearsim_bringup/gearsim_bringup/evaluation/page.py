@@ -23,13 +23,13 @@ Result = dict[str, Any]
 
 _HEAD = """# How often the diagnosis is right
 
-Written by `./gearsim evaluate --page docs/evaluation.md` from the results of the runs below, nothing by
-hand. Every case is a machine of its own: random teeth, bearings, masses, springs and gear errors
-(`gearsim_bringup/evaluation/machines.py`), random speed (5 to 30 Hz of the input shaft), load and sensor noise,
+Written by `./gearsim evaluate --page docs/evaluation.md` from the results of the runs below, nothing by hand.
+Every case is a machine of its own: random teeth, bearings, masses, springs and gear errors
+(`gearsim_bringup/evaluation/machines.py`), random speed (5 to 30 Hz of the input shaft), load and noise,
 and no fault, one or two of random kind, place and size. It is simulated and diagnosed from nameplate, tachos,
 encoders and accelerometers. Right means component and fault; of wheels that turn at one speed the mesh
-counts, of planets the stage. Thresholds and weights were fitted to other seeds than are judged here. Shares are given
-with Wilson's interval of 95 %.
+counts, of planets the stage. Thresholds and weights were fitted to other seeds than are judged here. Shares
+are given with Wilson's interval of 95 %.
 """
 
 _SETS = {

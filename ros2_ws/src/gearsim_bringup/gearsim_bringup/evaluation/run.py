@@ -54,6 +54,27 @@ def judge_case(case: Case) -> Result:
     return _result(case, diagnosis, time.process_time() - began)
 
 
+def _judge_or_say(case: Case) -> Result:
+    """The result; a diagnosis that breaks is told as `crashed` and counts as wrong."""
+    try:
+        return judge_case(case)
+    except Exception as error:
+        truths = [asdict(truth) for truth in case.truths]
+        said = {"component": "", "fault": "crashed", "confidence": 0.0, "evidence": {"features": {}}}
+        return {
+            "name": case.name,
+            "set": case.set_name,
+            "kind": case.kind,
+            "truths": truths,
+            "facts": case.facts,
+            "twin_wheels": False,
+            "quality": [],
+            "findings": [said],
+            "cpu_s": 0.0,
+            "crashed": f"{type(error).__name__}: {error}",
+        }
+
+
 def _result(case: Case, diagnosis: Diagnosis, cpu_s: float) -> Result:
     told = diagnosis.to_json()
     mesh = case.machine["nameplate"].get("gear_meshes", {}).get("gears")
@@ -104,7 +125,9 @@ def evaluate(
     done = {one["name"]: one for one in read_results(out)}
     left = [case for case in wanted if case.name not in done]
     tell(cases - len(left), cases)
+    whole = not (out / RESULTS).is_file() or (out / RESULTS).read_bytes()[-1:] in (b"", b"\n")
     with (out / RESULTS).open("a") as file:
+        file.write("" if whole else "\n")  # a line that was cut off stays by itself
         for count, result in enumerate(_judged(left, workers), cases - len(left) + 1):
             file.write(json.dumps(_plain(result), allow_nan=False) + "\n")
             file.flush()
@@ -115,11 +138,11 @@ def evaluate(
 
 def _judged(cases: list[Case], workers: int) -> Iterator[Result]:
     if workers == 1:
-        yield from map(judge_case, cases)
+        yield from map(_judge_or_say, cases)
         return
     # Fresh processes: compiled loops and thread pools do not survive a fork.
     with ProcessPoolExecutor(min(workers, os.cpu_count() or 1), get_context("spawn")) as pool:
-        yield from pool.map(judge_case, cases)
+        yield from pool.map(_judge_or_say, cases)
 
 
 def read_results(out: Path) -> list[Result]:

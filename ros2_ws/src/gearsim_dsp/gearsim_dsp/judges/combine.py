@@ -9,6 +9,8 @@ from gearsim_dsp.judges.registry import judge_all
 __all__ = ["all_findings"]
 
 _SAME_ORDER = 0.012
+# What a shaft that shakes its wheel looks like to the judge of gears.
+_SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
 _TOOTH_FAULTS = ("gear_tooth_crack", "gear_tooth_spall", "planet_tooth_crack", "planet_tooth_spall")
 
 
@@ -30,16 +32,9 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     others = judge_all(measured)
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
     kept = [one for one in bearings if not any(_is_multiple(one, tooth) for tooth in teeth)]
-    rotors = [one for one in others if one.fault == "unbalance"]
-    kept += [one for one in others if not _is_rotors_doing(one, rotors)]
+    shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
+    kept += [one for one in others if not (shaken and one.fault in _SHAKEN_GEARS)]
     return tuple(sorted(kept, key=lambda one: -one.confidence))
-
-
-def _is_rotors_doing(finding: Finding, rotors: list[Finding]) -> bool:
-    """A heavy shaft moves its wheel too, once a turn of either."""
-    return finding.fault == "gear_eccentricity" and any(
-        abs(finding.found_order / rotor.found_order - 1.0) < 1e-3 for rotor in rotors
-    )
 
 
 def _is_multiple(bearing: Finding, tooth: Finding) -> bool:

@@ -30,8 +30,9 @@ from gearsim_io.nameplate import GearMesh
 __all__ = ["judge_gears", "wheel_name"]
 
 # Limits over what a thousand healthy simulated gearboxes show, see docs/evaluation.md.
-_TOOTH_OVER_REST = 2.4
-_TOOTH_OVER_MEDIAN = 5.0
+_TOOTH_OVER_REST = 2.0
+_TOOTH_OVER_MEDIAN = 4.0
+_TOOTH_LOG10_CHANCE = -4.0
 _WEAR_SPREAD = 0.06
 _WEAR_HARMONICS = 0.35
 _RUNOUT_OF_PITCH = 0.010
@@ -44,8 +45,8 @@ def judge_gears(measured: Measured) -> tuple[Finding, ...]:
         return ()
     machine = measured.machine
     geared = {s for mesh in machine.gear_meshes for s in (mesh.driving_shaft, mesh.driven_shaft)}
-    ratios = sorted({round(machine.shaft(name).ratio, 9) for name in geared})
-    signs = [one for ratio in ratios for one in shaft_signs(measured, ratio)]
+    ratios = {round(machine.shaft(name).ratio, 9): machine.shaft(name).ratio for name in sorted(geared)}
+    signs = [one for ratio in ratios.values() for one in shaft_signs(measured, ratio)]
     found = [finding for one in _strongest_teeth(signs) if (finding := _bad_tooth(measured, one))]
     found += _wear(measured, signs, found)
     found += _off_axis(measured)
@@ -66,7 +67,11 @@ def wheel_name(measured: Measured, ratio: float, teeth: int) -> tuple[str, GearM
 def _strongest_teeth(signs: list[ShaftSigns]) -> list[ShaftSigns]:
     """The wheel with the tooth that stands out most; the other one of its mesh hears it too."""
     standing = [
-        one for one in signs if one.over_rest >= _TOOTH_OVER_REST and one.over_median >= _TOOTH_OVER_MEDIAN
+        one
+        for one in signs
+        if one.over_rest >= _TOOTH_OVER_REST
+        and one.over_median >= _TOOTH_OVER_MEDIAN
+        and one.log10_chance <= _TOOTH_LOG10_CHANCE
     ]
     return sorted(standing, key=lambda one: -one.over_rest)[:1]
 
@@ -77,6 +82,7 @@ def _bad_tooth(measured: Measured, signs: ShaftSigns) -> Finding:
     features = {
         "over_rest": math.log(signs.over_rest / _TOOTH_OVER_REST),
         "over_median": math.log(signs.over_median / _TOOTH_OVER_MEDIAN),
+        "improbable": min(-signs.log10_chance, 30.0) / 10.0,
         "kind": math.log(kind.probability / max(1.0 - kind.probability, 1e-3)),
         "spread": math.log(max(signs.spread, 1e-4) / _WEAR_SPREAD),
     }
@@ -162,10 +168,14 @@ def _off_axis(measured: Measured) -> list[Finding]:
     found = []
     for mesh in measured.machine.gear_meshes:
         runout = wheel_runout(measured, mesh)
-        if runout is None or runout.share_of_pitch < _RUNOUT_OF_PITCH:
+        if runout is None:
+            continue
+        # Two wheels of one speed add up what each may have, in any phase.
+        limit = _RUNOUT_OF_PITCH * (1.0 if runout.side else math.sqrt(2.0))
+        if runout.share_of_pitch < limit:
             continue
         ratio = measured.machine.shaft(runout.shaft).ratio
-        features = {"runout": math.log(runout.share_of_pitch / _RUNOUT_OF_PITCH)}
+        features = {"runout": math.log(runout.share_of_pitch / limit)}
         share = runout.share_of_pitch
         finding = Finding(
             f"{mesh.name}.{runout.side}" if runout.side else mesh.name,

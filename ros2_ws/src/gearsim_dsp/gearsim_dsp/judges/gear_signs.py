@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft as sfft
+from scipy import special
 from scipy.ndimage import uniform_filter1d
 
 from gearsim_dsp.angle.resample import full_rate
@@ -25,6 +27,9 @@ _SIDEBANDS = 2
 _SHAFT_HARMONICS = 6  # what shafts and couplings do belongs to the shaft judge
 _NEAR_TEETH = 2.5
 _LEAST_TURNS = 10.0
+_MOST_DECADES = 60.0
+_NOISE_DOUBT = 0.1  # of the noise's energy: how well some dozens of averaged turns tell it
+_LEAST_FUNDAMENTAL = 0.1  # of the strongest mesh line: less is some other machine part at these orders
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -70,6 +75,8 @@ class ShaftSigns:
         Angle of the tooth that stands out most, in turns.
     over_rest, over_median : float
         Energy of that tooth over that of the strongest other one, and over the median angle.
+    log10_chance : float
+        Logarithm of the probability that teeth as uneven as the others have one so far out.
     best : ChannelSigns
         That shows it best.
     turns : int
@@ -82,6 +89,7 @@ class ShaftSigns:
     place: float
     over_rest: float
     over_median: float
+    log10_chance: float
     best: ChannelSigns
     turns: int
 
@@ -110,6 +118,7 @@ class ShaftSigns:
         """The lines of this mesh make up most of what is regular, and stand out of the noise."""
         heard = [
             float(np.sqrt(np.sum(one.mesh_rms**2))) >= max(0.7 * one.regular_rms, 3.0 * one.noise_rms)
+            and one.mesh_rms[0] >= _LEAST_FUNDAMENTAL * float(one.mesh_rms.max())
             for one in self._clear
         ]
         return 2 * sum(heard) > len(heard)
@@ -189,22 +198,53 @@ def _combined(ratio: float, teeth: int, channels: tuple[ChannelSigns, ...], coun
     hearing = [one.channel for one in channels if one.difference_rms > 1.5 * one.noise_rms]
     if len(hearing) > 1:
         profiles["together"] = np.exp(np.mean([np.log(profiles[name] + _TINY) for name in hearing], axis=0))
-    stands = {name: _stands(profile, teeth) for name, profile in profiles.items()}
+    # In units of the profiles' medians, as the profiles are.
+    noise = {one.channel: one.noise_rms**2 / max(float(np.median(one.profile)), _TINY) for one in channels}
+    noise["together"] = float(np.median([noise[name] for name in hearing])) if hearing else 1.0
+    stands = {name: _stands(profile, teeth, min(1.0, noise[name])) for name, profile in profiles.items()}
     # Of single channels one in several stands out more by chance; together they are the surer witness.
     name = "together" if "together" in stands else max(stands, key=lambda key: stands[key][1])
-    place, over_rest, over_median = stands[name]
+    place, over_rest, over_median, chance = stands[name]
     best = max(channels, key=lambda one: stands[one.channel][1])
-    return ShaftSigns(ratio, teeth, channels, place, over_rest, over_median, best, count)
+    return ShaftSigns(ratio, teeth, channels, place, over_rest, over_median, chance, best, count)
 
 
-def _stands(profile: Array, teeth: int) -> tuple[float, float, float]:
-    """Place of the strongest tooth [turns], its energy over the next one's and over the median."""
+def _stands(profile: Array, teeth: int, noise: float) -> tuple[float, float, float, float]:
+    """Place of the strongest tooth [turns], its energy over the next one's and the median, and the chance."""
     size = profile.size
     top = int(np.argmax(profile))
     away = np.abs((np.arange(size) - top + size // 2) % size - size // 2)
-    rest = float(profile[away > _NEAR_TEETH * size / teeth].max(initial=_TINY))
+    others = profile[away > _NEAR_TEETH * size / teeth]
+    rest = float(others.max(initial=_TINY))
     peak = float(profile[top])
-    return top / size, peak / rest, peak / max(float(np.median(profile)), _TINY)
+    chance = _log10_chance(peak, others, 2 * teeth, noise) if others.size else 0.0
+    return top / size, peak / rest, peak / max(float(np.median(profile)), _TINY), chance
+
+
+def _log10_chance(peak: float, others: Array, places: int, noise: float) -> float:
+    """log10 of the probability that the highest of so many energies reaches the peak by chance.
+
+    Two chances, of which the larger counts. Errors of sound teeth are Gaussian, so what they add to the noise
+    is distributed as their mean times chi^2 with one degree of freedom. And noise alone, whose energies are
+    Gamma distributed with the shape that their 16 % quantile over their median tells.
+    """
+    uneven = max(float(np.mean(others)) - noise, 0.0) + _NOISE_DOUBT * noise
+    by_teeth = float(special.erfc(math.sqrt(max(peak - noise, 0.0) / max(2.0 * uneven, _TINY))))
+    low, median = np.quantile(others, [0.16, 0.5])
+    shapes, ratios, medians = _gamma_shapes()
+    shape = float(np.interp(low / max(float(median), _TINY), ratios, shapes))
+    middle = float(np.interp(shape, shapes, medians))
+    by_noise = float(special.gammaincc(shape, middle * peak / max(float(median), _TINY)))
+    chance = places * max(by_teeth, by_noise)
+    return float(min(0.0, math.log10(max(chance, 10.0**-_MOST_DECADES))))
+
+
+@cache
+def _gamma_shapes() -> tuple[Array, Array, Array]:
+    """Shapes, and for each the 16 % quantile over the median (ascending) and the median."""
+    shapes = np.geomspace(0.4, 400.0, 200)
+    medians = special.gammaincinv(shapes, 0.5)
+    return shapes, special.gammaincinv(shapes, 0.16) / medians, medians
 
 
 def _trimmed(profile: Array) -> float:

@@ -48,10 +48,8 @@ class Measured:
             raise InputError("Measured", "channels", sorted(lengths), "channels of one length")
 
     @classmethod
-    def of_record(
-        cls, record: Record, machine: Machine, speed: ShaftSpeed, unfit: frozenset[str] = frozenset()
-    ) -> Measured:
-        """The channels of a record but for those that are unfit.
+    def of_record(cls, record: Record, machine: Machine, speed: ShaftSpeed) -> Measured:
+        """The machine's channels in a record but for those that are constant or not finite.
 
         Parameters
         ----------
@@ -59,13 +57,12 @@ class Measured:
         machine : Machine
         speed : ShaftSpeed
             With its phase over the record, where that is known.
-        unfit : frozenset of str
         """
         known = {channel.name for channel in machine.channels} or set(record.channels)
         channels = {
             name: record.data[row]
             for row, name in enumerate(record.channels)
-            if name in known and name not in unfit and bool(np.all(np.isfinite(record.data[row])))
+            if name in known and bool(np.all(np.isfinite(record.data[row]))) and np.ptp(record.data[row]) > 0
         }
         encoders = {
             one.shaft: PulseTrain(one.shaft, float(one.lines_per_revolution), one.samples)

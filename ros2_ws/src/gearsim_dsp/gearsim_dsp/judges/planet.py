@@ -42,8 +42,8 @@ _NEAR_TEETH = 2.5
 _PAIR_TEETH = 1.3  # half a pitch of the tooth's two contacts, and the smoothing over one tooth
 _TURNS_COUNTED = 4
 # Limits over what a thousand healthy simulated stages show, see docs/evaluation.md.
-_LEAST_RATIO = 1.2
-_LEAST_DEVIATIONS = 6.0
+_LEAST_RATIO = 1.35
+_LEAST_DEVIATIONS = 7.0
 _PAIR_DEVIATIONS = 4.0
 _PAIR_OVER_REST = 1.04
 _SEVERE, _MODERATE = 30.0, 5.0

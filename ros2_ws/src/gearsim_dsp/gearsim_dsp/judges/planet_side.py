@@ -25,7 +25,7 @@ from gearsim_io.nameplate import PlanetaryStage
 if TYPE_CHECKING:
     from gearsim_dsp.judges.planet import FoldedResidual
 
-__all__ = ["SIDE_BANDS_HZ", "spall_side"]
+__all__ = ["SIDE_BANDS_HZ", "side_of", "spall_side"]
 
 SIDE_BANDS_HZ = ((300.0, 1500.0), (1500.0, 3000.0), (3000.0, 5000.0), (5000.0, 8000.0), (8000.0, 13000.0))
 _SENSORS = ("ring", "carrier", "sun")
@@ -52,14 +52,17 @@ def spall_side(
     levels = [_levels(measured, stage, by_name[name], place) for name in _SENSORS]
     ring, carrier, sun = (np.log10(level) for level in levels)
     features = [*(ring - sun), *(carrier - sun)]
+    rounded = [round(float(value), 4) for value in features]
+    side, sure = side_of(rounded)
+    return {"side": side, "side_confidence": sure, "side_features": rounded}
+
+
+def side_of(features: list[float]) -> tuple[str, float]:
+    """Side and its probability from the ten logarithms of energy ratios."""
     model = _model()
     total = model["offset"] + float(np.dot(model["weights"], features))
     probability = 1.0 / (1.0 + math.exp(-max(min(total, 60.0), -60.0)))
-    return {
-        "side": "sun" if probability >= 0.5 else "ring",
-        "side_confidence": max(probability, 1.0 - probability),
-        "side_features": [round(float(value), 4) for value in features],
-    }
+    return ("sun" if probability >= 0.5 else "ring"), max(probability, 1.0 - probability)
 
 
 def _levels(

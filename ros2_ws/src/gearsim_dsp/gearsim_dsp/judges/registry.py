@@ -24,5 +24,7 @@ JUDGES: Mapping[str, Callable[[Measured], tuple[Finding, ...]]] = {
 
 
 def judge_all(measured: Measured) -> tuple[Finding, ...]:
-    """What all judges find, in their order."""
+    """What all judges find, in their order; nothing where no channel is fit to be judged."""
+    if not measured.channels:
+        return ()
     return tuple(finding for judge in JUDGES.values() for finding in judge(measured))

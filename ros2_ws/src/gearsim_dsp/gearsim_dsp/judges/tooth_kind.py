@@ -20,7 +20,7 @@ from scipy import fft as sfft
 
 from gearsim_dsp.judges.gear_signs import ShaftSigns
 
-__all__ = ["KIND_FEATURES", "ToothKind", "tooth_kind"]
+__all__ = ["KIND_FEATURES", "ToothKind", "kind_of", "tooth_kind"]
 
 KIND_FEATURES = ("peak", "energy", "duration", "pitch", "early")
 _HALF_WINDOW_TEETH = 2.5
@@ -66,6 +66,11 @@ def tooth_kind(signs: ShaftSigns) -> ToothKind:
         math.log(max(pitch_order, 1e-3)),
         float(energy[:top].sum()) / total,
     )
+    return kind_of(features)
+
+
+def kind_of(features: tuple[float, ...]) -> ToothKind:
+    """The same from the numbers alone."""
     model = _model()
     total_score = model["offset"] + float(np.dot(model["weights"], features))
     spall = 1.0 / (1.0 + math.exp(-max(min(total_score, 60.0), -60.0)))
