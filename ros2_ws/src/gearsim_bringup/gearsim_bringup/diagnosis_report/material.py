@@ -105,6 +105,15 @@ class Material:
         return float(self.diagnosis.speed.value_hz)
 
     @property
+    def speed_change(self) -> float:
+        """Spread of the speed over tenths of the record, over its mean; 0 where the angle is not known."""
+        if self.turning.phase is None:
+            return 0.0
+        ends = np.linspace(0.0, self.record.sample_count - 1.0, 11)
+        speeds = np.diff(np.interp(ends, self.turning.phase.samples, self.turning.phase.turns))
+        return float(np.ptp(speeds) / np.mean(speeds))
+
+    @property
     def angle(self) -> Phase | None:
         """Angle over the record: measured, found, or of a constant speed."""
         if self.turning.phase is not None:

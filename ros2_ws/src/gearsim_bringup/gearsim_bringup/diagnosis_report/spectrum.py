@@ -18,6 +18,7 @@ _POINTS = 2500
 _LOW_POINTS = 5000
 _FINE_S = 2.0
 _LEAST_TOP_HZ = 50.0
+_SMEARING = 0.005
 
 
 def draw_spectrum(material: Material) -> Plot:
@@ -67,10 +68,12 @@ def draw_low_spectrum(material: Material) -> Plot:
         "xaxis": axis("frequency, Hz", 0.0, top),
         "yaxis": axis(material.density_unit, low, high, type="log", exponentformat="power", dtick=1),
     }
+    change = material.speed_change
+    smeared = f" The speed changes by {100 * change:.2g} %, which smears lines; the order spectrum does not."
     caption = (
-        "The lower part of the same spectrum with the lines that nameplate and speed foretell; a click on "
-        "an entry of the legend shows or hides its lines. Bearing faults often hide here, while the "
-        "envelope shows them."
+        "The lower part of the same spectrum with the lines that nameplate and speed foretell; a click on an "
+        "entry of the legend shows or hides its lines. Bearing faults often hide here, while the envelope "
+        f"shows them.{smeared if change > _SMEARING else ''}"
     )
     return Plot("Power spectrum with the expected lines", caption, tuple(data), layout, 400)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 from scipy import fft as sfft
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, SERIES, Plot, axis, curve
+from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, SERIES, Plot, axis, curve, extremes
+from gearsim_bringup.diagnosis_report.words import shaft_words
+from gearsim_dsp.angle.encoder import encoder_phase, transmission_error
 from gearsim_dsp.angle.resample import full_rate
 from gearsim_dsp.decide import Finding
 from gearsim_dsp.gear_kinematics import GearWheel, gear_wheels
@@ -25,6 +28,8 @@ __all__ = ["draw_turn"]
 _SAMPLES_PER_TOOTH = 32
 _MOST_SAMPLES = 6000
 _SIDEBANDS = 2
+_MOST_LINES = 256
+_TURNS_SHOWN = 6
 
 
 def draw_turn(material: Material, number: int, finding: Finding) -> Plot | None:
@@ -34,6 +39,8 @@ def draw_turn(material: Material, number: int, finding: Finding) -> Plot | None:
         return _planet(material, finding, colour)
     if finding.fault in ("gear_tooth_crack", "gear_tooth_spall", "gear_wear"):
         return _wheel(material, finding, colour)
+    if finding.fault == "gear_eccentricity":
+        return _runout(material, finding, colour)
     if isinstance(finding.evidence.get("order_velocities_mm_s"), dict):
         return _velocities(finding, colour)
     return None
@@ -81,6 +88,39 @@ def _wheel_of(material: Material, finding: Finding) -> GearWheel | None:
     wheels = gear_wheels(material.machine)
     own = [one for one in wheels if one.component == finding.component]
     return next(iter(own or [one for one in wheels if one.mesh == finding.component]), None)
+
+
+def _runout(material: Material, finding: Finding, colour: str) -> Plot | None:
+    name = finding.component.split(".")[0]
+    mesh = next((one for one in material.machine.gear_meshes if one.name == name), None)
+    edges = {train.shaft: train for train in material.record.encoders}
+    if mesh is None or not {mesh.driving_shaft, mesh.driven_shaft} <= edges.keys():
+        return None
+    count = material.record.sample_count
+    driving, driven = (
+        encoder_phase(edges[shaft], count) for shaft in (mesh.driving_shaft, mesh.driven_shaft)
+    )
+    lines = min(_MOST_LINES, edges[mesh.driving_shaft].lines_per_revolution)
+    error = transmission_error(
+        driving, driven, mesh.driving_teeth, mesh.driven_teeth, samples_per_turn=lines
+    ).signal
+    # The turn of the slower wheel, some times over.
+    turns = math.ceil(_TURNS_SHOWN * max(1.0, mesh.driven_teeth / mesh.driving_teeth))
+    share = error.values[: turns * lines] * (100 * mesh.driving_teeth / (2 * math.pi))
+    values, stride = extremes(share, _MOST_SAMPLES // 2)
+    bound = 1.15 * float(np.max(np.abs(values)))
+    layout = {
+        "xaxis": axis(f"turns of {shaft_words(mesh.driving_shaft)}", 0.0, turns),
+        "yaxis": axis("% of the tooth pitch", -bound, bound),
+        "showlegend": False,
+    }
+    shaft = shaft_words(mesh.driven_shaft)
+    caption = (
+        f"How far {shaft} lags behind what the teeth demand, by the two encoders. The quick swing is the "
+        "mesh; the slow one, once a turn, comes from a wheel that does not turn about its centre."
+    )
+    data = (curve(values, 0.0, stride / lines, "transmission error", colour),)
+    return Plot("Transmission error", caption, data, layout)
 
 
 def _planet(material: Material, finding: Finding, colour: str) -> Plot:
