@@ -344,3 +344,25 @@ def test_a_place_makes_alarms_of_one_fault_distinct():
     row = tuple(replace(sign(20, group=c, channel=c), place=c) for c in ("b1_y", "b3_y"))
     flat = [a for step in feed(book(), [row] * 2) for a in step]
     assert [a.alarm_id for a in flat] == [f"envelope/bearing_3/outer_race/{c}" for c in ("b1_y", "b3_y")]
+
+
+def test_a_detail_that_comes_late_is_told_once():
+    wide, wider = ", about 0.8 mm wide", ", about 0.9 mm wide"
+    rows = (
+        [(sign(20),)] * 3 + [(replace(sign(20), detail=wide),)] * 3 + [(replace(sign(20), detail=wider),)] * 3
+    )
+    alarms = book()
+    changes = feed(alarms, rows)
+    assert [len(step) for step in changes] == [0, 1, 0, 1, 0, 0, 0, 0, 0]
+    assert changes[1][0].reason.endswith("21 dB over the floor")
+    assert changes[3][0].reason.endswith("21 dB over the floor, about 0.8 mm wide")
+    assert (changes[3][0].previous_level, changes[3][0].level) == (Level.ERROR, Level.ERROR)
+    # what is known when it is raised is told at once, and forgotten with the alarm
+    feed(alarms, [0] * 9, start=9)
+    again = feed(alarms, [(replace(sign(20), detail=wider),)] * 3, start=18)
+    assert [[a.reason[-19:] for a in step] for step in again] == [[], [wider], []]
+    feed(alarms, [0] * 9, start=21)
+    assert not feed(alarms, [20, 20], start=30)[1][0].reason.endswith("wide")
+    assert not any(
+        feed(alarms, [(replace(sign(20, "bearing_4", group="outer_race@bearing_3"), detail=wide),)], start=32)
+    )

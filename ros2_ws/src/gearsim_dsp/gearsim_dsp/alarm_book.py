@@ -31,6 +31,7 @@ class _Slot:
     component: str = ""
     acknowledged: bool = False
     operator: str = ""
+    detail: str = ""
     alarm: Alarm | None = None
     strongest: Indication | None = None
 
@@ -183,9 +184,19 @@ class AlarmBook:
         held = self.settings.latch.holds(slot.level) and not slot.acknowledged
         if shows > slot.level or (shows < slot.level and not held):
             return [self._change(slot, shows)]
-        if shows == before or slot.level == Level.OK or not (shows == Level.OK or before == Level.OK):
-            return []
-        return [self._change(slot, slot.level)]  # latched, and its cause has gone or come back
+        turned = shows != before and Level.OK in (shows, before)
+        if slot.level > Level.OK and (turned or self._more_is_known(slot)):
+            return [
+                self._change(slot, slot.level)
+            ]  # latched, and its cause has gone or come back; or a detail
+        return []
+
+    def _more_is_known(self, slot: _Slot) -> bool:
+        """True when the latest window brings a detail that the alarm was told without."""
+        latest = slot.recent[-1]
+        if slot.shows == Level.OK or slot.detail or latest is None:
+            return False
+        return bool(latest.detail) and latest.component == slot.component
 
     def _reattribute(self, slot: _Slot) -> list[Alarm]:
         """Move an alarm to another member of its group when all recent windows agree on that one."""
@@ -210,8 +221,9 @@ class AlarmBook:
         shown = level > Level.OK and shows > Level.OK and level >= slot.level
         if shown and deciding is not None:
             slot.strongest = deciding
+        slot.detail = (slot.detail or self._detail(slot)) if level > Level.OK else ""
         previous, slot.level = slot.level, level
-        reason = why or (base.words if shown else self._calm_words(base, slot))
+        reason = why or (base.words + slot.detail if shown else self._calm_words(base, slot))
         latest = slot.recent[-1] if slot.recent else None
         slot.alarm = Alarm(
             t_ns=self._t_ns,
@@ -237,6 +249,11 @@ class AlarmBook:
             acknowledged_by=slot.operator,
         )
         return slot.alarm
+
+    def _detail(self, slot: _Slot) -> str:
+        """The latest detail of the component that is named."""
+        known = (i.detail for i in reversed(slot.recent) if i is not None and i.component == slot.component)
+        return next((detail for detail in known if detail), "")
 
     def _limit(self, level: Level, shown: bool) -> float:
         limits = self.thresholds

@@ -116,6 +116,9 @@ class Indication:
         That the statement is right, 0 to 1.
     words : str
         For people: "outer race of bearing_3: 48.9 Hz and 5 harmonics, 21 dB over the floor".
+    detail : str
+        What ends the words once it is known, such as ", about 0.8 mm wide"; an alarm that was raised without
+        it is told once more with it.
     place : str
         Last part of the alarm's name where one fault of one component has several alarms, such as a channel.
     may_raise : bool
@@ -134,6 +137,7 @@ class Indication:
     words: str = ""
     may_raise: bool = True
     place: str = ""
+    detail: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,10 @@ class EnvelopeParameters(MonitorParameters):
         _DEFAULT.kurtogram_every, "windows from one choice of a band to the next; 0: none", 0, 1000
     )
 
+    size_every: int = parameter(
+        _DEFAULT.size_every, "windows from one measurement of a spall's width to the next; 0: none", 0, 1000
+    )
+
     def check(self) -> None:
         """Raise InputError where values contradict each other."""
         super().check()
@@ -35,7 +39,9 @@ class EnvelopeParameters(MonitorParameters):
         """The part for the monitor."""
         automatic = self.band_low_hz == 0 and self.band_high_hz == 0
         band = None if automatic else (self.band_low_hz, self.band_high_hz)
-        return EnvelopeSettings(self.window_settings(), band, self.memory_windows, self.kurtogram_every)
+        return EnvelopeSettings(
+            self.window_settings(), band, self.memory_windows, self.kurtogram_every, self.size_every
+        )
 
 
 def make_monitor(machine: Machine, parameters: EnvelopeParameters) -> AlarmedMonitor:

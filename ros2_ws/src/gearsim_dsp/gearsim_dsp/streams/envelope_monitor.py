@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.band_keeper import BandKeeper
+from gearsim_dsp.streams.live_sizes import LiveSizes, width_words
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.streams.window_speeds import LiveSpeeds, WindowSpeeds
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
@@ -49,19 +50,22 @@ class EnvelopeSettings:
         machine: 1 where an angle signal is listed, else 4, for the sake of the speed's estimate.
     kurtogram_every : int
         Windows from one choice of a band to the next (of another channel); 0: no kurtogram.
+    size_every : int
+        Windows from one measurement of a spall's width to the next, where there is a finding; 0: none.
     """
 
     window: WindowSettings = field(default_factory=WindowSettings)
     band_hz: tuple[float, float] | None = None
     memory_windows: int = 0
     kurtogram_every: int = 16
+    size_every: int = 64
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
             raise InputError(
                 "envelope settings", "band_hz", self.band_hz, "low and high with 0 <= low < high"
             )
-        for name in ("memory_windows", "kurtogram_every"):
+        for name in ("memory_windows", "kurtogram_every", "size_every"):
             if not 0 <= getattr(self, name) <= 1000:
                 raise InputError("envelope settings", name, getattr(self, name), "0 to 1000")
 
@@ -104,6 +108,7 @@ class EnvelopeMonitor:
         find_faults(machine, self._pool)  # an impossible nameplate is told now, not at the first window
         self._families = fault_families(machine)
         self._speeds = speeds or LiveSpeeds(machine)
+        self._sizes = LiveSizes(machine, self.settings.size_every)
         self._run = 0
 
     @property
@@ -124,6 +129,7 @@ class EnvelopeMonitor:
             self._pool.reset()
             self._keeper.reset()
             self._speeds.reset()
+            self._sizes.reset()
             self._run = window.run
         speed = self._speeds.of(window)
         self._keeper.renew(window, speed.value_hz)
@@ -142,7 +148,7 @@ class EnvelopeMonitor:
             frame_id=self.machine.name,
             features=tuple(self._features(window, result, verdict) for result in results if result.spectra),
             spectra=tuple(self._spectrum(window, result, verdict) for result in results if result.spectra),
-            indications=indications(verdict) if judged else (),
+            indications=indications(verdict, self._widths(window, verdict, speed)) if judged else (),
             tests=1,
             judged=judged,
             note="" if judged else self._why_not(quality, speed),
@@ -164,6 +170,14 @@ class EnvelopeMonitor:
                 bands=() if band is None else (band,),
             )
         )
+
+    def _widths(self, window: Window, verdict: Verdict, speed: ShaftSpeed) -> dict[str, str]:
+        """Words on the width of each finding's spall, by group."""
+        best = speed if speed.phase is not None else verdict.speed
+        return {
+            group_of(f.fault, f.expected_order): width_words(self._sizes.of(window, f, best))
+            for f in verdict.findings
+        }
 
     def _why_not(self, quality: tuple[QualityIssue, ...], speed: ShaftSpeed) -> str:
         fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
@@ -276,9 +290,13 @@ def _of_channel(verdict: Verdict, channel: str) -> Iterable[FamilyEvidence]:
     return (evidence for evidence in verdict.by_channel if evidence.channel == channel)
 
 
-def indications(verdict: Verdict) -> tuple[Indication, ...]:
-    """Findings, and what is no finding (any more) but still half as large as one must be."""
-    found = {group_of(f.fault, f.expected_order): _sign(f) for f in verdict.findings}
+def indications(verdict: Verdict, widths: Mapping[str, str] | None = None) -> tuple[Indication, ...]:
+    """Findings, and what is no finding (any more) but still half as large as one must be.
+
+    `widths` are words on the width of the spall by group, to end the reason with.
+    """
+    groups = {group_of(f.fault, f.expected_order): f for f in verdict.findings}
+    found = {group: _sign(finding, (widths or {}).get(group, "")) for group, finding in groups.items()}
     for evidence in verdict.evidence:
         group = group_of(evidence.family.fault, evidence.family.order)
         if group not in found and evidence.modulation >= _KEEPS * MODULATION_LIMIT:
@@ -286,7 +304,7 @@ def indications(verdict: Verdict) -> tuple[Indication, ...]:
     return tuple(found[group] for group in sorted(found))
 
 
-def _sign(finding: Finding) -> Indication:
+def _sign(finding: Finding, width: str) -> Indication:
     p = finding.evidence["false_alarm_probability"]
     assert isinstance(p, float)
     return Indication(
@@ -300,6 +318,7 @@ def _sign(finding: Finding) -> Indication:
         found_frequency_hz=float(finding.found_hz),
         confidence=float(finding.confidence),
         words=_words(finding),
+        detail=width,
     )
 
 
