@@ -269,6 +269,17 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path, what):
         assert target.read_text() == "mine"
 
 
+def test_a_bad_folder_is_refused_before_anything_is_read(tmp_path, capsys):
+    from gearsim_bringup.cli import main
+
+    assert (
+        main(["diagnose", str(tmp_path / "no_such.mat"), "--machine", "mfpt", "--report", str(tmp_path)]) != 0
+    )
+    told = capsys.readouterr().err
+    assert f"{tmp_path}: got a folder that exists already" in told
+    assert "no_such" not in told
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_where_nothing_may_be_written_is_refused(tmp_path):
     tmp_path.chmod(0o500)

@@ -147,8 +147,8 @@ def _stacked(
         data += [{**trace, "yaxis": f"y{number}"} for trace in traces]
         top = 1.0 - row * share
         ends = _around(traces[0]["y"]) if title == _SPEED else ()
-        mode = "normal" if ends else "tozero"
-        vertical = axis(title, *ends, domain=[top - 0.82 * share, top], nticks=4, rangemode=mode)
+        more: dict[str, Any] = {} if ends else {"rangemode": "tozero"}
+        vertical = axis(title, *ends, domain=[top - 0.82 * share, top], nticks=4, **more)
         layout[f"yaxis{number}"] = vertical
     last = "" if len(rows) == 1 else str(len(rows))
     layout["xaxis"] = axis("time, s", 0.0, seconds, anchor=f"y{last}")
