@@ -21,6 +21,7 @@ FIGURES: tuple[str, ...] = (
     "protrugram",
     "scf_slices",
     "self_adaptive_noise_cancellation",
+    "spall_size",
     "spectral_coherence",
     "spectral_kurtosis",
     "speed_without_tacho",

@@ -171,15 +171,15 @@ def _sized(mean: MeanImpact | None, sample_rate_hz: float, way: RacePass) -> Siz
         return Sizing(None, "unknown", f"fewer than {_LEAST_IMPACTS} impacts")
     if mean.likeness < _LEAST_LIKENESS:
         return Sizing(None, "unknown", f"impacts are not alike (correlation {mean.likeness:.2f})")
-    if mean.extent > _MOST_EXTENT and float(np.std(mean.values)) > _CLEAR_MEAN * mean.noise:
-        share = f"{100 * mean.extent:.0f} % of the period"
-        return Sizing(None, "extended", f"vibration during {share} and no single events: a rough zone")
     per_m = sample_rate_hz / way.speed_m_s
     least = _PAIR_RELEASES * way.release_m * per_m
     pair = energy_pair(mean.segments, sample_rate_hz, least, _WIDEST * mean.period)
     found = explanations(mean, sample_rate_hz, way)
     verdict = judged(found, pair, per_m, way)
     if pair is None and max(each.gain for each, _ in found) < _LEAST_GAIN:
+        if mean.extent > _MOST_EXTENT and float(np.std(mean.values)) > _CLEAR_MEAN * mean.noise:
+            share = f"{100 * mean.extent:.0f} % of the period"
+            return Sizing(None, "extended", f"vibration during {share} without single events: a rough zone")
         text = "a single impulse explains the impacts as well as entry and impact do"
         return Sizing(None, "unknown", text)
     kind: Kind = "localised" if pair is None else "wide"

@@ -10,9 +10,7 @@ from gearsim_dsp.speed import Phase, ShaftSpeed
 
 __all__ = ["Stretch", "steady_stretch"]
 
-_TOLERANCE = (
-    0.03  # of the speed: widths read from times are then wrong by less than what the model leaves out
-)
+_TOLERANCE = 0.03  # of the speed: less than the model leaves out
 _MOST_KNOTS = 400
 
 
