@@ -85,6 +85,15 @@ def test_width_is_told_through_an_unknown_path(width, release):
         assert found.spacing == pytest.approx(width - 2 * release, rel=0.05)
 
 
+def test_the_quiet_moment_of_entry_counts_beside_a_loud_impact():
+    """A spall that never empties the contact, through a path with echoes that the model lacks."""
+    drive = force_change(np.arange(900.0) - (450 - 22), 44.0, 26.0)
+    echoed = lfilter([1, 0, 0, -0.3, 0.2, 0.5, -0.4], 1, ringing(drive))
+    echoed = echoed / np.abs(echoed).max() + 0.003 * np.random.default_rng(0).standard_normal(900)
+    found = explain(echoed, 40, 15.0, (8.0, 400.0))
+    assert found.width[0] == pytest.approx(44.0, rel=0.03)  # with equal weights: 8
+
+
 def test_one_knock_looks_like_the_narrowest_spall_of_all():
     drive = np.zeros(900)
     drive[450] = 1.0
