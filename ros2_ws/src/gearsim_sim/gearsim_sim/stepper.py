@@ -194,7 +194,7 @@ class Stepper:
         """Let a variant of the loop move `state`; returns its rows at the output samples."""
         width = MOTION_COLUMNS + len(self._rows) + self._place.size
         motion = np.empty((count // self.oversampling + 1, width))
-        stride = 1 if side.active else node_stride(self._node_order, self._schedule.segment)
+        stride = 1 if side.swings else node_stride(self._node_order, self._schedule.segment)
         work = make_work(self._data, drive, self._place.size)
         samples = loop(
             *state, self._data, drive, side, self._memory, work, self.step, count, stride, accel, column,

@@ -125,8 +125,8 @@ def make_loop(
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
 
-        Mesh functions are looked up every `stride` steps, see `mesh_nodes`; with forces beside the machine's
-        own elements, which may turn its shafts, at every step.
+        Mesh functions are looked up every `stride` steps, see `mesh_nodes`; at every step where forces beside
+        the machine's own elements turn its shafts.
 
         accel (site rows, columns) gets `count` columns from `column` on. `motion` (samples,
         MOTION_COLUMNS + state rows of both parts + interfaces) gets a row at each output sample.
@@ -135,6 +135,7 @@ def make_loop(
         known0, known1, inputs = work.known0, work.known1, work.inputs
         now, jumps, meshes, nodes = work.now, work.jumps, work.meshes, work.nodes
         sites0, sites1 = known0.size, known1.size
+        swings = sided * side.swings
         rest_terms(memory, now)
         per_step = 1.0 / drive.length_steps
         per_second = per_step / data.step_s
@@ -145,7 +146,7 @@ def make_loop(
         before = first // stride * stride - stride
         while before < first + count:
             behind = before + stride
-            for _ in range(1 - sided):
+            for _ in range(1 - swings):
                 turns, speed, _ = reference_motion(behind, drive, per_step, per_second)
                 move_phases(drive, turns - anchor, phases)
                 next_node(phases, speed * data.step_s, drive, data.meshes, nodes)
@@ -186,9 +187,9 @@ def make_loop(
                     step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
                     data.step_s, balls,
                 )  # fmt: skip
-                for _ in range(sided):
+                for _ in range(swings):
                     look_up(phases, speed, drive, data.meshes, meshes)
-                for _ in range(1 - sided):
+                for _ in range(1 - swings):
                     between_nodes(step - before, stride, data.step_s, nodes, meshes)
                 mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
                 remember_forces(s0, forces, 0, n0, i0)

@@ -62,6 +62,7 @@ class Side(NamedTuple):
     """What the loop needs; N = modes of both parts (real and imaginary), I = interfaces of both parts."""
 
     active: int  # 1 if there is anything at all
+    swings: int  # 1 if the rigid rotation may have left its course
     step: Array  # (directions, N) what a newton at the new instant adds to the mode coordinates
     rows: Array  # (directions, N) displacement
     rate_rows: Array  # (directions, N)

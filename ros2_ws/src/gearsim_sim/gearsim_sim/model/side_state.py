@@ -117,6 +117,7 @@ class SideState:
         state = self._remembered([*keys["feet"], *keys["oscillators"]])
         return Side(
             active=int(bool(rows) or self._swings),
+            swings=int(self._swings),
             **{name: getattr(found, name) for name in Directions.__dataclass_fields__},
             **packed,
             poles=np.array(poles, dtype=np.float64).reshape(len(poles), POLE_SIZE),
