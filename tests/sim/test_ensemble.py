@@ -3,8 +3,8 @@
 Both loops do the same sums in another order, so their outputs agree to rounding, not to the last bit: the
 scheme's sums have about 200 terms, and the gearbox forgets a disturbance within a tenth of a second, so that
 rounding of 1e-16 stays below 1e-9 of the signal. Among themselves, lanes do the same operations in the same
-order: there the last bit must agree. Ensembles look up the functions of meshes at every step, engines at nodes:
-for the comparison these do so at every step too, but for one, which shows what the nodes leave.
+order: there the last bit must agree. Ensembles look up the functions of meshes at every step, engines at
+nodes; here these do so at every step too, but for one test, which shows what the nodes leave.
 """
 
 from dataclasses import replace

@@ -47,7 +47,7 @@ setup(
         f"gearsim_dsp=={VERSION}",
     ],
     # What `gearsim bench` compares with.
-    extras_require={"bench": ["PySDKit==0.5.0"]},
+    extras_require={"bench": ["PySDKit==0.5.0", "openconmo==0.0.6"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -14,8 +14,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from gearsim_bringup.evaluation.cases import Case, draw_case
 from gearsim_dsp.diagnose import Diagnosis, diagnose_record
 from gearsim_io.errors import InputError
@@ -35,7 +33,7 @@ def simulate_case(case: Case) -> tuple[Record, Machine]:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{case.name}.yaml"
-        (path.parent / "machine.yaml").write_text(yaml.safe_dump(case.machine))
+        (path.parent / "machine.yaml").write_text(json.dumps(case.machine))  # JSON is YAML
         scenario = parse_scenario(case.scenario, path)
         return to_record(scenario, case.seconds), scenario.machine
 
