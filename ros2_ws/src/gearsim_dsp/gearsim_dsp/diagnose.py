@@ -16,9 +16,10 @@ from gearsim_dsp.angle.record_speed import record_speed
 from gearsim_dsp.decide import Finding, Verdict, find_faults
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
 from gearsim_dsp.evidence import EvidencePool
-from gearsim_dsp.judges.bearing import find_strange_comb
 from gearsim_dsp.judges.combine import all_findings
 from gearsim_dsp.judges.measured import Measured
+from gearsim_dsp.judges.sizes import with_size
+from gearsim_dsp.judges.strange import find_strange_comb
 from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.quality import QualityIssue, check_levels
 from gearsim_dsp.speed import ShaftSpeed
@@ -122,8 +123,15 @@ def _finding_line(finding: Finding) -> str:
     return (
         f"{what}: {finding.found_hz:.2f} Hz (order {finding.found_order:.4f}, expected "
         f"{finding.expected_order:.4f}), {finding.snr_db:.0f} dB over the floor, {finding.severity}, "
-        f"confidence {finding.confidence:.2f}"
+        f"{_size_words(finding)}confidence {finding.confidence:.2f}"
     )
+
+
+def _size_words(finding: Finding) -> str:
+    if finding.size is None:
+        return ""
+    low, high = finding.size.ci95_mm
+    return f"about {finding.size.value_mm:.2g} mm wide ({low:.2g} to {high:.2g}), "
 
 
 def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSettings | None = None) -> Diagnosis:
@@ -156,7 +164,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
     if angle.replaces_angle and angle.speed is not None:
         speeds = KnownSpeeds(angle.speed, record.first_sample)
-    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window), speeds=speeds)
+    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window, size_every=0), speeds=speeds)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
     pool = EvidencePool(plate)
     reports: list[Report] = []
@@ -174,7 +182,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     # A wrong angle signal is not to be read again.
     sound = replace(record, tachos=(), encoders=()) if angle.replaces_angle else record
     measured = Measured.of_record(sound, plate, speed)
-    findings = all_findings(measured, verdict.findings)
+    findings = tuple(with_size(one, measured) for one in all_findings(measured, verdict.findings))
     electrical = _electrical_notes(record, plate, verdict, findings)
     if not findings:
         supply = plate.line_frequency_hz or 50.0

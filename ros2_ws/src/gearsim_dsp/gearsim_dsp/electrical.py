@@ -156,4 +156,5 @@ def _alone(height_db: NDArray[np.float64], line: int, step_hz: float) -> bool:
     low = height_db[max(0, line - reach) : max(0, line - skirt)]
     high = height_db[line + skirt + 1 : line + reach + 1]
     top = float(height_db[max(0, line - 1) : line + 2].max())
-    return max(low.max(initial=-np.inf), high.max(initial=-np.inf)) < top - _ALONE_DB
+    beside = max(float(low.max(initial=-np.inf)), float(high.max(initial=-np.inf)))
+    return beside < top - _ALONE_DB

@@ -1,8 +1,9 @@
 """Weights of the confidence and of the two discriminants, fitted to results of one seed.
 
-Logistic regression with a ridge (a Gaussian prior of width 2 on standardised weights), so that a fault whose
-findings were all right does not get infinite weights; and one wrong finding with the mean numbers is added to
-each fault, as a few dozen cases cannot tell 97 from 100 %.
+Logistic regression with a ridge (a Gaussian prior on standardised weights), so that faults whose findings
+were all right do not get infinite weights; one wrong finding with the mean numbers is added to each model, as
+a few dozen cases cannot tell 97 from 100 %. Faults that are found by the same evidence share a model, and a
+number that means more evidence cannot lower the confidence.
 """
 
 from __future__ import annotations
@@ -24,8 +25,17 @@ __all__ = ["fit_all", "logistic_weights"]
 
 Array = NDArray[np.float64]
 Result = dict[str, Any]
-_PRIOR = 2.0
+_PRIOR = 1.0
 _LEAST_FINDINGS = 15
+_GROUPS = (
+    ("outer_race", "inner_race", "rolling_element", "cage"),
+    ("gear_tooth_crack", "gear_tooth_spall"),
+    ("planet_tooth_crack", "planet_tooth_spall"),
+    ("gear_wear",),
+    ("gear_eccentricity",),
+    ("unbalance", "misalignment", "looseness"),
+)
+_EITHER_WAY = ("spread", "pair", "share_of_harmonics")
 _FOLDER = Path(gearsim_dsp.judges.__file__).parent
 
 
@@ -70,13 +80,17 @@ def fit_all(results: Sequence[Result], source: str, folder: Path = _FOLDER) -> l
     return said
 
 
-def logistic_weights(features: Array, right: NDArray[np.bool_]) -> tuple[float, Array]:
+def logistic_weights(
+    features: Array, right: NDArray[np.bool_], rising: Sequence[bool] = ()
+) -> tuple[float, Array]:
     """Offset and weights of the most probable logistic model under the prior.
 
     Parameters
     ----------
     features : ndarray, shape (cases, numbers)
     right : ndarray of bool, shape (cases,)
+    rising : sequence of bool, optional
+        Numbers whose weight may not be negative.
     """
     mean, scale = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-6)
     x = (features - mean) / scale
@@ -89,7 +103,8 @@ def logistic_weights(features: Array, right: NDArray[np.bool_]) -> tuple[float, 
         value = np.logaddexp(0.0, -margin).sum() + 0.5 * np.sum((weights[1:] / _PRIOR) ** 2)
         return float(value), gradient
 
-    best = minimize(loss, np.zeros(x.shape[1] + 1), jac=True, method="L-BFGS-B").x
+    bounds = [(None, None), *((0.0 if up else None, None) for up in rising or [False] * x.shape[1])]
+    best = minimize(loss, np.zeros(x.shape[1] + 1), jac=True, method="L-BFGS-B", bounds=bounds).x
     weights = best[1:] / scale
     return float(best[0] - weights @ mean), np.asarray(weights)
 
@@ -119,15 +134,16 @@ def _confidence(results: Sequence[Result], file: Path, source: str) -> str:
     # Faults with too few findings share what holds for all together, less one right one in each hundred.
     share = (right + 1) / (len(findings) + 3)
     models["other"] = {"offset": float(np.log(share / (1 - share)))}
-    for fault in sorted({word for word, _, _ in findings}):
-        own = [(numbers, ok) for word, numbers, ok in findings if word == fault]
+    for group in _GROUPS:
+        own = [(numbers, ok) for word, numbers, ok in findings if word in group]
         if len(own) < _LEAST_FINDINGS:
             continue
         names = sorted({name for numbers, _ in own for name in numbers})
         x = np.array([[float(numbers.get(name, 0.0)) for name in names] for numbers, _ in own])
         x = np.vstack([x, x.mean(axis=0)])
         ok = np.array([*(label for _, label in own), False])
-        offset, weights = logistic_weights(x, ok)
-        models[fault] = {"offset": offset, **{n: float(w) for n, w in zip(names, weights, strict=True)}}
+        offset, weights = logistic_weights(x, ok, [name not in _EITHER_WAY for name in names])
+        model = {"offset": offset, **{n: float(w) for n, w in zip(names, weights, strict=True)}}
+        models.update(dict.fromkeys(group, model))
     file.write_text(json.dumps({"source": source, "models": models}, indent=2) + "\n")
     return f"confidence: {len(findings)} findings, {right} right, models for {', '.join(models)}"

@@ -16,11 +16,11 @@ others.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gearsim_dsp.bands import Band
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.families import FamilyEvidence, FamilySearch
 from gearsim_dsp.judges.confidence import confidence
@@ -36,7 +36,6 @@ __all__ = [
     "MODULATION_LIMIT",
     "Verdict",
     "find_faults",
-    "find_strange_comb",
     "is_fault",
 ]
 
@@ -46,12 +45,9 @@ DOMINANCE_LIMIT = 1.6
 _MOST_FINDINGS = 4
 _CAGE_FUNDAMENTAL_DB = 10.0
 _CAGES_ALIKE = 0.06
+_SAME_COMB = 3e-3
 _SECOND_DOMINANCE = 3.0
 _SECOND_SHARE = 0.2
-_STRANGE_LOW, _STRANGE_HIGH, _STRANGE_REACH = 1.5, 15.0, 0.15
-_STRANGE_PROBABILITY = 1e-8
-_STRANGE_MODULATION = 0.25
-_STRANGE_DB = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,102 +106,19 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
         if not good:
             break
         best = max(good, key=lambda g: _best(latest[id(g)]).modulation)
+        alike = [g for g in good if _same_lines(_best(latest[id(g)]), _best(latest[id(best)]))]
+        best = max(alike, key=lambda g: _near(machine, g, latest[id(g)]))
         findings.append(_finding(machine, best, latest[id(best)], speed))
         open_groups.remove(best)
-        open_groups = [g for g in open_groups if not _accompanies(machine, g, findings[-1])]
+        open_groups = [
+            g for g in open_groups if g not in alike and not _accompanies(machine, g, findings[-1])
+        ]
         for search in searches:
             search.explain(best.first, _best(latest[id(best)]).found_order)
         for group in open_groups:
             latest[id(group)] = _judge(group, searches)
     evidence = tuple(replace(_best(latest[id(g)]), family=family) for g in groups for family in g.families)
     return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed, by_channel)
-
-
-def find_strange_comb(machine: Machine, pool: EvidencePool, skip_hz: Sequence[float] = ()) -> Finding | None:
-    """A strong family of lines that belongs to nothing on the nameplate, as a finding of fault "unknown".
-
-    Parameters
-    ----------
-    machine : Machine
-    pool : EvidencePool
-    skip_hz : sequence of float
-        Frequencies (supply and the like) whose multiples have another explanation.
-
-    Notes
-    -----
-    Fundamentals from 1.3 to 15 orders, in stretches of 15 % either way. The limits are stricter than those of
-    families that the nameplate expects: what nobody expects needs better evidence.
-    """
-    speed = pool.speed()
-    channels = pool.spectra()
-    if not channels or not np.isfinite(speed.value_hz):
-        return None
-    centres = _STRANGE_LOW * ((1 + _STRANGE_REACH) / (1 - _STRANGE_REACH)) ** np.arange(9)
-    families = [
-        FaultFamily("", "unknown", float(centre), 0.0, "unknown", _STRANGE_REACH)
-        for centre in centres
-        if centre < _STRANGE_HIGH
-    ]
-    looks = len(families) * len(channels)
-    loudest = max(spectra.whole for spectra in channels)
-    searches = [FamilySearch(machine, spectra, speed, looks, loudest) for spectra in channels]
-    expected = [family.order for family in fault_families(machine)]
-    best: FamilyEvidence | None = None
-    for search in searches:
-        for family in families:
-            found = search.judge(family)
-            if _is_strange(found, expected, skip_hz) and (best is None or found.modulation > best.modulation):
-                best = found
-    return None if best is None else _strange_finding(best, speed)
-
-
-def _is_strange(evidence: FamilyEvidence, expected: Sequence[float], skip_hz: Sequence[float]) -> bool:
-    clear = sum(level >= _STRANGE_DB for level in evidence.harmonic_snr_db[:4])
-    if (
-        evidence.false_alarm_probability > _STRANGE_PROBABILITY
-        or evidence.modulation < _STRANGE_MODULATION
-        or evidence.dominance < DOMINANCE_LIMIT
-        or clear < 3
-    ):
-        return False
-    # A multiple or an even part of what a bearing does is that bearing's affair.
-    for order in expected:
-        for factor in (1 / 3, 0.5, 1.0, 2.0, 3.0):
-            if abs(evidence.found_order / (order * factor) - 1.0) < 0.02:
-                return False
-    return not any(
-        abs(evidence.found_hz / hz - max(1.0, round(evidence.found_hz / hz))) * hz < 0.004 * evidence.found_hz
-        for hz in skip_hz
-        if hz > 0
-    )
-
-
-def _strange_finding(evidence: FamilyEvidence, speed: ShaftSpeed) -> Finding:
-    features = {"modulation": math.log(evidence.modulation / _STRANGE_MODULATION)}
-    details: dict[str, object] = {
-        "what": "impacts at a rate that belongs to nothing on the nameplate",
-        "channel": evidence.channel,
-        "band_hz": [evidence.band.low_hz, evidence.band.high_hz],
-        "frequency_hz": evidence.found_hz,
-        "harmonic_snr_db": [round(v, 2) for v in evidence.harmonic_snr_db],
-        "false_alarm_probability": evidence.false_alarm_probability,
-        "modulation": evidence.modulation,
-        "dominance": evidence.dominance,
-        "speed_source": speed.source,
-        "features": features,
-    }
-    return Finding(
-        "",
-        "unknown",
-        evidence.found_order,
-        evidence.found_order,
-        evidence.found_hz,
-        evidence.snr_db,
-        confidence("unknown", features),
-        _severity(evidence.modulation),
-        evidence.channel,
-        details,
-    )
 
 
 def _stands(machine: Machine, group: _Group, judged: list[FamilyEvidence], findings: list[Finding]) -> bool:
@@ -226,6 +139,29 @@ def _stands(machine: Machine, group: _Group, judged: list[FamilyEvidence], findi
         ):
             return False
     return True
+
+
+def _same_lines(one: FamilyEvidence, other: FamilyEvidence) -> bool:
+    """Two families that were found at one and the same comb, which lies within the tolerance of both."""
+    return abs(one.found_order / other.found_order - 1.0) < _SAME_COMB
+
+
+def _near(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> float:
+    """How loudly the lines are heard next to the group's bearings, over the loudest channel anywhere.
+
+    Bands count in decibels, as in `_shares`.
+    """
+    own = {name for family in group.families for name in machine.bearing(family.component).channels}
+    bands: dict[Band, dict[str, float]] = {}
+    for evidence in judged:
+        for one in evidence.by_band:
+            if one.clear:
+                bands.setdefault(one.band, {})[evidence.channel] = one.amplitude
+    ratios = []
+    for levels in bands.values():
+        near = max((level for name, level in levels.items() if name in own), default=0.0)
+        ratios.append(math.log(max(near, 1e-3 * max(levels.values())) / max(levels.values())))
+    return float(np.mean(ratios)) if ratios else -math.inf
 
 
 def _accompanies(machine: Machine, group: _Group, finding: Finding) -> bool:
@@ -307,7 +243,7 @@ def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], spee
         evidence.found_hz,
         evidence.snr_db,
         confidence(family.fault, features),
-        _severity(evidence.modulation),
+        severity_of(evidence.modulation),
         evidence.channel,
         details,
     )
@@ -354,7 +290,7 @@ def _shares(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> di
     return {f.component: mean.get(f.component, 0.0) / total for f in group.families}
 
 
-def _severity(modulation: float) -> str:
+def severity_of(modulation: float) -> str:
     if modulation >= 1.0:
         return "severe"
     return "moderate" if modulation >= 0.25 else "slight"

@@ -9,6 +9,7 @@ from gearsim_dsp.judges.registry import judge_all
 __all__ = ["all_findings"]
 
 _SAME_ORDER = 0.012
+_CLEARLY_ITS_OWN = 3.0
 # What a shaft that shakes its wheel looks like to the judge of gears.
 _SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
 _TOOTH_FAULTS = ("gear_tooth_crack", "gear_tooth_spall", "planet_tooth_crack", "planet_tooth_spall")
@@ -31,10 +32,25 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     """
     others = judge_all(measured)
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
-    kept = [one for one in bearings if not any(_is_multiple(one, tooth) for tooth in teeth)]
+    kept = [one for one in bearings if not any(_is_teeths_doing(one, tooth, measured) for tooth in teeth)]
     shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
     kept += [one for one in others if not (shaken and one.fault in _SHAKEN_GEARS)]
     return tuple(sorted(kept, key=lambda one: -one.confidence))
+
+
+def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bool:
+    """At a multiple of the tooth's rate; or in a planet, where the carrier's sidebands of it are."""
+    if _is_multiple(bearing, tooth):
+        return True
+    planets = {stage.planet_shaft for stage in measured.machine.planetary_stages}
+    inside = measured.machine.bearing(bearing.component).shaft in planets
+    dominance = bearing.evidence.get("dominance")
+    return (
+        inside
+        and tooth.fault.startswith("planet_")
+        and isinstance(dominance, float)
+        and dominance < _CLEARLY_ITS_OWN
+    )
 
 
 def _is_multiple(bearing: Finding, tooth: Finding) -> bool:

@@ -33,6 +33,7 @@ __all__ = ["judge_gears", "wheel_name"]
 _TOOTH_OVER_REST = 2.0
 _TOOTH_OVER_MEDIAN = 4.0
 _TOOTH_LOG10_CHANCE = -4.0
+_TOOTH_OVER_DOUBT = 6.0
 _WEAR_SPREAD = 0.06
 _WEAR_HARMONICS = 0.35
 _RUNOUT_OF_PITCH = 0.010
@@ -71,6 +72,7 @@ def _strongest_teeth(signs: list[ShaftSigns]) -> list[ShaftSigns]:
         for one in signs
         if one.over_rest >= _TOOTH_OVER_REST
         and one.over_median >= _TOOTH_OVER_MEDIAN
+        and one.over_doubt >= _TOOTH_OVER_DOUBT
         and one.log10_chance <= _TOOTH_LOG10_CHANCE
     ]
     return sorted(standing, key=lambda one: -one.over_rest)[:1]
@@ -82,6 +84,7 @@ def _bad_tooth(measured: Measured, signs: ShaftSigns) -> Finding:
     features = {
         "over_rest": math.log(signs.over_rest / _TOOTH_OVER_REST),
         "over_median": math.log(signs.over_median / _TOOTH_OVER_MEDIAN),
+        "over_doubt": math.log(min(signs.over_doubt, 1e4) / _TOOTH_OVER_DOUBT),
         "improbable": min(-signs.log10_chance, 30.0) / 10.0,
         "kind": math.log(kind.probability / max(1.0 - kind.probability, 1e-3)),
         "spread": math.log(max(signs.spread, 1e-4) / _WEAR_SPREAD),

@@ -47,6 +47,8 @@ class ChannelSigns:
     profile : ndarray, shape (samples,)
         Mean square of the difference signal over one pitch around each angle.
     difference : ndarray, shape (samples,)
+    doubt : ndarray, shape (samples,)
+        What of the profile may be random at each angle, by the scatter of the single turns there.
     fm4 : float
     """
 
@@ -57,6 +59,7 @@ class ChannelSigns:
     mesh_rms: Array
     profile: Array
     difference: Array
+    doubt: Array
     fm4: float
 
 
@@ -94,6 +97,12 @@ class ShaftSigns:
     turns: int
 
     @property
+    def over_doubt(self) -> float:
+        """Energy of the tooth over what impacts that have nothing to do with the turn may leave there."""
+        at = round(self.place * self.best.profile.size) % self.best.profile.size
+        return float(self.best.profile[at] / max(float(self.best.doubt[at]), _TINY))
+
+    @property
     def spread(self) -> float:
         """Difference signal without its strongest tenth over the regular signal: teeth uneven all round."""
         return _median(
@@ -121,7 +130,7 @@ class ShaftSigns:
             and one.mesh_rms[0] >= _LEAST_FUNDAMENTAL * float(one.mesh_rms.max())
             for one in self._clear
         ]
-        return 2 * sum(heard) > len(heard)
+        return bool(2 * sum(heard) > len(heard))
 
     @property
     def _clear(self) -> list[ChannelSigns]:
@@ -188,6 +197,7 @@ def _signs(name: str, average: Average, regular: list[int], teeth: int) -> Chann
         mesh,
         np.asarray(profile),
         np.asarray(difference),
+        np.asarray(uniform_filter1d(average.std**2, width, mode="wrap")) * (share / average.count),
         float(np.mean(difference**4)) / square**2,
     )
 
@@ -243,8 +253,9 @@ def _log10_chance(peak: float, others: Array, places: int, noise: float) -> floa
 def _gamma_shapes() -> tuple[Array, Array, Array]:
     """Shapes, and for each the 16 % quantile over the median (ascending) and the median."""
     shapes = np.geomspace(0.4, 400.0, 200)
-    medians = special.gammaincinv(shapes, 0.5)
-    return shapes, special.gammaincinv(shapes, 0.16) / medians, medians
+    medians = np.asarray(special.gammaincinv(shapes, 0.5), dtype=np.float64)
+    ratios = np.asarray(special.gammaincinv(shapes, 0.16), dtype=np.float64) / medians
+    return shapes, ratios, medians
 
 
 def _trimmed(profile: Array) -> float:
