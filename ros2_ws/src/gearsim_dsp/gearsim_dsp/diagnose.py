@@ -35,6 +35,8 @@ from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
 
 _IMPACT_PROBABILITY = 1e-4
+LEAST_CONFIDENCE = 0.3
+"""What is less sure is told as "doubtful_finding" in `quality`, and is no finding."""
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose_record"]
 
@@ -127,6 +129,10 @@ def _finding_line(finding: Finding) -> str:
     )
 
 
+def _doubtful(finding: Finding) -> QualityIssue:
+    return QualityIssue("doubtful_finding", finding.channel, _finding_line(finding))
+
+
 def _size_words(finding: Finding) -> str:
     if finding.size is None:
         return ""
@@ -182,7 +188,9 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     # A wrong angle signal is not to be read again.
     sound = replace(record, tachos=(), encoders=()) if angle.replaces_angle else record
     measured = Measured.of_record(sound, plate, speed)
-    findings = tuple(with_size(one, measured) for one in all_findings(measured, verdict.findings))
+    said = all_findings(measured, verdict.findings)
+    findings = tuple(with_size(one, measured) for one in said if one.confidence >= LEAST_CONFIDENCE)
+    notes += [_doubtful(one) for one in said if one.confidence < LEAST_CONFIDENCE]
     electrical = _electrical_notes(record, plate, verdict, findings)
     if not findings:
         supply = plate.line_frequency_hz or 50.0

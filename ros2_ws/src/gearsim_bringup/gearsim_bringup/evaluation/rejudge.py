@@ -10,6 +10,7 @@ import copy
 import math
 from typing import Any
 
+from gearsim_dsp.diagnose import LEAST_CONFIDENCE
 from gearsim_dsp.judges.confidence import confidence
 from gearsim_dsp.judges.planet_side import side_of
 from gearsim_dsp.judges.tooth_kind import kind_of
@@ -34,5 +35,8 @@ def rejudged(result: Result) -> Result:
         if "side_features" in evidence:
             evidence["side"], evidence["side_confidence"] = side_of(evidence["side_features"])
         finding["confidence"] = confidence(finding["fault"], features)
-    fresh["findings"].sort(key=lambda one: -one["confidence"])
+    sure = [
+        one for one in fresh["findings"] if one["confidence"] >= LEAST_CONFIDENCE or one["fault"] == "crashed"
+    ]
+    fresh["findings"] = sorted(sure, key=lambda one: -one["confidence"])
     return fresh
