@@ -71,8 +71,8 @@ def test_files_hold_what_the_engine_gives(tmp_path, capsys):
     with np.load(told["variants"][1]["file"]) as found:
         assert found["sample_rate_hz"] == 65536
         for name, signal in zip(expected.site_names, expected.accel, strict=True):
-            # Written as float32.
-            assert found[name] == pytest.approx(signal, abs=2e-7 * np.abs(signal).max())
+            # Written as float32; an ensemble looks meshes up at every step, an engine at nodes.
+            assert found[name] == pytest.approx(signal, abs=1e-5 * np.std(signal))
         angle = (expected.turns + expected.fraction)[0, :: int(found["angle_every"])]
         assert found[f"angle_turns_{expected.shaft_names[0]}"] == pytest.approx(angle, abs=1e-12)
     with open(told["table"]) as table:

@@ -156,7 +156,7 @@ def rig_file(tmp_path, *pairs):
 
 REFUSED = [
     ("sites: {accel: y}", "sites: {acel: y}", "sites.acel.*one of the channels accel"),
-    ("sites: {accel: y}", "sites: {accel: z}", "sites.accel.*'x' or 'y'"),
+    ("sites: {accel: y}", "sites: {accel: z}", "sites.accel: got z, expected one of x, y"),
     ("kind: bearing_rig", "kind: gearbox", "kind.*bearing_rig"),
     ("  pedestal:\n", "  plinth:\n", "plinth|pedestal.*nothing"),
     (
