@@ -22,6 +22,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # Sums may be reordered and multiply-adds fused, so that loops fill vector registers; NaN and infinity
 # keep their meaning. The order is fixed at compile time: one build gives the same bits at each call.
 FAST = {"reassoc", "contract", "nsz"}
+# The compiler keeps two versions of a loop that writes to one array while it reads another, and takes the
+# scalar one where they lie (nearly) end to end. Where these fuse different multiply-adds, bits would hang on
+# where the arrays happen to lie; so nothing is fused there.
+_UNFUSED = FAST - {"contract"}
 _ROOT = Path(__file__).parents[1]
 _FOLDERS = ("integrate", "model")
 
@@ -63,7 +67,7 @@ def inlined(function: Function) -> Function:
 
 def apart(function: Function) -> Function:
     """A part of a compiled loop that is called, not copied; it allocates nothing. For what few steps need."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": FAST, "error_model": "numpy", "_nrt": False}
+    options: dict[str, Any] = {"nogil": True, "fastmath": _UNFUSED, "error_model": "numpy", "_nrt": False}
     return cast(Function, numba.njit(**options)(function))
 
 
