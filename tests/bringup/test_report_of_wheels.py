@@ -9,8 +9,8 @@ import pytest
 from gearsim_bringup.diagnosis_report.material import Material
 from gearsim_bringup.diagnosis_report.tooth import draw_turn
 from gearsim_bringup.diagnosis_report.words import evidence_rows, fault_name, meaning
-from gearsim_dsp.decide import Finding, Size
 from gearsim_dsp.diagnose import Diagnosis
+from gearsim_dsp.judges.finding import Finding, Size
 from gearsim_dsp.speed import ShaftSpeed
 
 

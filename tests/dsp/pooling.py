@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsim_dsp.decide import Verdict, find_faults
 from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.judges.bearing import Verdict, find_faults
 from gearsim_dsp.speed import window_speed
 from gearsim_dsp.window import WindowInput, analyse_window
 from gearsim_io.nameplate import Machine

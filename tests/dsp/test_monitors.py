@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rig_stream import BPFI_ORDER, BPFO_ORDER, RATE_HZ, cut, interleave, machine, record
 
 from gearsim_dsp.alarms import AlarmSettings
-from gearsim_dsp.decide import MODULATION_LIMIT, find_faults
+from gearsim_dsp.judges.bearing import MODULATION_LIMIT, find_faults
 from gearsim_dsp.results import Level
 from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings, indications

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsim_dsp.decide import MODULATION_LIMIT, find_faults
 from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.judges.bearing import MODULATION_LIMIT, find_faults
 from gearsim_dsp.speed import window_speed
 from gearsim_dsp.window import WindowInput, analyse_window
 from gearsim_io.record import PulseTrain

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.sizing.crossing import RacePass, force_change
 from gearsim_dsp.sizing.double_event import explain
 from gearsim_dsp.sizing.double_impact import DoubleImpact, speed_law

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gearsim_dsp.angle.record_speed import record_speed
-from gearsim_dsp.decide import Finding, Verdict, find_faults
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
 from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.judges.bearing import Verdict, find_faults
 from gearsim_dsp.judges.combine import all_findings
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.sizes import with_size
 from gearsim_dsp.judges.strange import find_strange_comb

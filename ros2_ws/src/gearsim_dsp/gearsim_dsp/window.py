@@ -5,7 +5,7 @@ A monitor that streams windows works like this::
     speed = window_speed(window.pulses, n, sample_rate_hz, machine)          # speed.py
     results = [analyse_window(WindowInput(...)) for each channel]
     pool.add(results)                                                        # evidence.py
-    findings = find_faults(machine, pool.evidence()).findings                # decide.py
+    findings = find_faults(machine, pool).findings                           # judges/bearing.py
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.cyclic.envelope_spectra import squared_envelope_spectrum
 from gearsim_dsp.cyclic.modulation import ModulationSpectrum
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 from gearsim_io.errors import InputError
 
 __all__ = ["draw_closest_envelope", "draw_envelope", "envelope_of"]

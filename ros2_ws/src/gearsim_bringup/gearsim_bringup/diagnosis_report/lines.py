@@ -9,7 +9,7 @@ from typing import Literal
 from gearsim_bringup.diagnosis_report.material import BEARING_FAULTS, Material
 from gearsim_bringup.diagnosis_report.plot import FOUND, GREEN, GREY, ORANGE
 from gearsim_bringup.diagnosis_report.words import fault_name, shaft_words
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 
 __all__ = [
     "Marks",

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_dsp.angle.record_speed import record_speed
-from gearsim_dsp.decide import Finding
 from gearsim_dsp.diagnose import Diagnosis
 from gearsim_dsp.families import FamilyEvidence
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import fault_families, mesh_orders
 from gearsim_dsp.planet_kinematics import planetary_orders
 from gearsim_dsp.speed import Phase, ShaftSpeed

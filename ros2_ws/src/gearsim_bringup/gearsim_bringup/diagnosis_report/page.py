@@ -24,7 +24,7 @@ from gearsim_bringup.diagnosis_report.spectrum import draw_low_spectrum, draw_sp
 from gearsim_bringup.diagnosis_report.tooth import draw_turn
 from gearsim_bringup.diagnosis_report.trend import draw_trend
 from gearsim_bringup.diagnosis_report.waveform import draw_blows, draw_waveform
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 from gearsim_io.errors import InputError
 
 __all__ = ["PLOTLY", "make_page", "script_safe"]

@@ -14,8 +14,8 @@ from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, SERIES, Plo
 from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.angle.encoder import encoder_phase, transmission_error
 from gearsim_dsp.angle.resample import full_rate
-from gearsim_dsp.decide import Finding
 from gearsim_dsp.gear_kinematics import GearWheel, gear_wheels
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.planet import FoldedResidual, fold_stage
 from gearsim_dsp.synchronous.signals import difference_signal

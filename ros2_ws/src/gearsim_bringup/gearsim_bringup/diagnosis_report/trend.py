@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from gearsim_bringup.diagnosis_report.material import Material
 from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, SERIES, Plot, axis, text
 from gearsim_bringup.diagnosis_report.words import fault_name
-from gearsim_dsp.decide import Finding
 from gearsim_dsp.envelope import squared_envelopes, suppress_lines, window_spectrum
 from gearsim_dsp.features import crest_factor, kurtosis, rms
+from gearsim_dsp.judges.finding import Finding
 from gearsim_io.errors import InputError
 
 __all__ = ["draw_trend", "fault_level"]

@@ -17,8 +17,8 @@ from gearsim_bringup.diagnosis_report.plot import (
     curve,
     extremes,
 )
-from gearsim_dsp.decide import Finding
 from gearsim_dsp.envelope import squared_envelopes, window_spectrum
+from gearsim_dsp.judges.finding import Finding
 from gearsim_io.errors import InputError
 
 __all__ = ["draw_blows", "draw_waveform"]

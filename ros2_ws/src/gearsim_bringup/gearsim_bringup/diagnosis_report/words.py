@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_dsp.decide import ALARM_PROBABILITY, DOMINANCE_LIMIT, MODULATION_LIMIT, Finding
 from gearsim_dsp.diagnose import Diagnosis
 from gearsim_dsp.families import FamilyEvidence
+from gearsim_dsp.judges.bearing import ALARM_PROBABILITY, DOMINANCE_LIMIT, MODULATION_LIMIT
+from gearsim_dsp.judges.finding import Finding
 
 __all__ = [
     "Row",

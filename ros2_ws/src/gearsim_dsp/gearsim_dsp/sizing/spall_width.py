@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import resample_poly
 
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.sizing.crossing import RacePass
 from gearsim_dsp.sizing.double_event import Explanations, explain
 from gearsim_dsp.sizing.energy_pair import EnergyPair, energy_pair

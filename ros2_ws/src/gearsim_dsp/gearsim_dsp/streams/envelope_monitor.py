@@ -10,9 +10,10 @@ import numpy as np
 
 from gearsim_dsp.alarms import Indication
 from gearsim_dsp.bands import Band
-from gearsim_dsp.decide import MODULATION_LIMIT, Finding, Verdict, find_faults
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.families import FamilyEvidence
+from gearsim_dsp.judges.bearing import MODULATION_LIMIT, Verdict, find_faults
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import fault_families
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker

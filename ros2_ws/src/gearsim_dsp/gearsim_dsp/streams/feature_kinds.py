@@ -57,7 +57,7 @@ KINDS: tuple[tuple[str, FeatureKind], ...] = (
     # 3 for noise, 1.5 for a sine; above about 4.5 impacts are taken for certain.
     ("kurtosis", FeatureKind(ratio=False, least=1.5)),
     ("crest_factor", FeatureKind(ratio=True, least=6 * _DB)),
-    # `decide` speaks of a weak modulation from 0.03 on; a quarter of what it takes to be a finding.
+    # The judge of bearings tells of a weak modulation from 0.03 on; a quarter of what a finding takes.
     ("*_modulation", FeatureKind(ratio=False, least=0.03)),
     # Gear indicators (Lebold et al., MFPT 54 (2000) 623-634): FM4 is 3 for a sound gear. FM0 is followed
     # only: the shaft's own lines are in it, and these are judged by themselves.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsim_dsp.decide import Finding
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.sizing.spall_width import Width, spall_width
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import Window

@@ -1,4 +1,4 @@
-"""Decisions on synthetic signals with known answers."""
+"""The judge of bearings on synthetic signals with known answers."""
 
 from dataclasses import replace
 
@@ -9,8 +9,8 @@ from pooling import pool_of, verdict_of
 from scipy import stats
 
 from gearsim_dsp.bands import Band
-from gearsim_dsp.decide import ALARM_PROBABILITY, MODULATION_LIMIT, find_faults, is_fault
 from gearsim_dsp.evidence import EvidencePool
+from gearsim_dsp.judges.bearing import ALARM_PROBABILITY, MODULATION_LIMIT, find_faults, is_fault
 from gearsim_dsp.kinematics import fault_families
 from gearsim_dsp.speed import nameplate_speed
 from gearsim_dsp.window import WindowInput, analyse_window
