@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from example_results import alarm, features, spectrum, trend_value, trends
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -95,84 +96,14 @@ def test_rclpy_and_the_pure_classes_agree(batch):
     equal(from_msg(serialization.deserialize_message(pure, type(ours))), batch)
 
 
-ALARM = results.Alarm(
-    t_ns=5,
-    frame_id="rig",
-    alarm_id="envelope/bearing_3/outer_race",
-    source="envelope",
-    component="bearing_3",
-    fault="outer_race",
-    channel="b3_y",
-    level=Level.ERROR,
-    previous_level=Level.OK,
-    expected_order=4.89,
-    found_order=4.88,
-    found_frequency_hz=48.8,
-    value=30.0,
-    threshold=12.0,
-    unit="dB",
-    confidence=0.99,
-    sample=131071,
-    reason="because",
-    present=False,
-    acknowledged=True,
-    acknowledged_by="Ada",
-)
-MARKER = results.SpectrumMarker("BPFO", "bearing_3", 4.89, 5, 0.0, 30.0)
-TREND = results.TrendValue(
-    source="kurtosis",
-    channel="b3_y",
-    component="",
-    name="rms",
-    unit="m/s^2",
-    value=2.0,
-    expected=1.5,
-    limit=3.0,
-    deviation=4.0,
-    slope=0.25,
-    slope_low=0.125,
-    slope_high=0.5,
-    direction="rising",
-    hours_to_limit=4.0,
-    span_s=3600.0,
-)
+# No field as it is by default, so that one that is left out is noticed.
+ALARM = alarm(present=False, acknowledged=True, acknowledged_by="Ada")
 OBJECTS = [
     ALARM,
-    results.Trends(9, "rig", "trend", 131071, "learnt from 60 s", (TREND, TREND)),
+    trends(trend_value(), trend_value(channel="b3_x")),
     results.AlarmState(6, "rig", "envelope", Level.ERROR, False, "", 131071, (ALARM, ALARM)),
-    results.Features(
-        t0_ns=7,
-        frame_id="rig",
-        source="kurtosis",
-        channel="b3_y",
-        first_sample=1,
-        sample_count=2,
-        sample_rate_hz=65536.0,
-        band_low_hz=0.0,
-        band_high_hz=32768.0,
-        speed_hz=10.0,
-        speed_source="tacho",
-        values=(results.FeatureValue("kurtosis", "", 3.0, "1"),),
-    ),
-    results.Spectrum(
-        t0_ns=8,
-        frame_id="rig",
-        source="envelope",
-        channel="b3_y",
-        kind="squared_envelope",
-        first_sample=1,
-        sample_count=2,
-        sample_rate_hz=65536.0,
-        band_low_hz=0.0,
-        band_high_hz=32768.0,
-        speed_hz=10.0,
-        axis_unit="order",
-        axis_start=0.0,
-        axis_step=0.5,
-        value_unit="1",
-        values=np.arange(5, dtype=np.float32),
-        markers=(MARKER,),
-    ),
+    features(),
+    spectrum(),
 ]
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from example_results import alarm, features, spectrum
 from recordings import make_record, write_bag
 
 from gearsim_dsp import results
@@ -21,40 +22,14 @@ from gearsim_io.scene.waves import Outliner, cut
 SECOND = 1_000_000_000
 
 
-def alarm(t_ns, level=Level.ERROR):
-    return results.Alarm(
-        t_ns=t_ns,
-        frame_id="unsw_parallel",
-        alarm_id="envelope/bearing_3/outer_race",
-        source="envelope",
-        component="bearing_3",
-        fault="outer_race",
-        channel="b3_y",
-        level=level,
-        previous_level=Level.OK,
-        expected_order=4.89,
-        found_order=4.89,
-        found_frequency_hz=48.9,
-        value=30.0,
-        threshold=12.0,
-        unit="dB",
-        confidence=0.99,
-        sample=1,
-        reason="outer race of bearing_3: 48.9 Hz",
-    )
-
-
 def window(record, k):
     return {
         "t0_ns": record.t0_ns + k * SECOND // 2,
         "frame_id": "unsw_parallel",
-        "channel": "b3_y",
         "first_sample": 2048 * k,
         "sample_count": 4096,
         "sample_rate_hz": 4096.0,
-        "band_low_hz": 0.0,
         "band_high_hz": 2048.0,
-        "speed_hz": 10.0,
     }
 
 
@@ -77,25 +52,13 @@ def bag(tmp_path_factory):
                 results.FeatureValue("kurtosis", "", 3.0 + k, "1"),
             )
             t_ns = common["t0_ns"] + SECOND
-            stream.write(
-                results.Features(**common, source="envelope", speed_source="tacho", values=values), t_ns
-            )
+            stream.write(features(**common, source="envelope", values=values), t_ns)
             power = rng.random(400).astype(np.float32)
             power[98] = 20.0
-            spectrum = results.Spectrum(
-                **common,
-                source="envelope",
-                kind="squared_envelope",
-                axis_unit="order",
-                axis_start=0.0,
-                axis_step=0.05,
-                value_unit="1",
-                values=power,
-                markers=(results.SpectrumMarker("BPFO", "bearing_3", 4.9, 3, 0.0, snr),),
-            )
-            stream.write(spectrum, t_ns)
+            marker = results.SpectrumMarker("BPFO", "bearing_3", 4.9, 3, 0.0, snr)
+            stream.write(spectrum(**common, axis_step=0.05, values=power, markers=(marker,)), t_ns)
         start = results.AlarmState(record.t0_ns + SECOND, "unsw_parallel", "envelope", Level.OK, False, "", 0)
-        raised = alarm(record.t0_ns + 4 * SECOND)
+        raised = alarm(t_ns=record.t0_ns + 4 * SECOND, frame_id="unsw_parallel", found_frequency_hz=48.9)
         state = results.AlarmState(
             raised.t_ns, "unsw_parallel", "envelope", Level.ERROR, False, "", 1, (raised,)
         )

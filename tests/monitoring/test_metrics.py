@@ -7,51 +7,18 @@ import math
 from dataclasses import replace
 
 import pytest
+from example_results import alarm, features, trend_value, trends
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from gearsim_bringup.monitoring.metrics import RigMetrics
 from gearsim_bringup.monitoring.mqtt_messages import messages_of, segment
-from gearsim_dsp.results import Alarm, AlarmState, Features, FeatureValue, Level, Trends, TrendValue
+from gearsim_dsp.results import AlarmState, Level
 
-ALARM = Alarm(
-    t_ns=5,
-    frame_id="rig",
-    alarm_id="envelope/bearing_3/outer_race",
-    source="envelope",
-    component="bearing_3",
-    fault="outer_race",
-    channel="b3_y",
-    level=Level.ERROR,
-    previous_level=Level.OK,
-    expected_order=4.89,
-    found_order=4.88,
-    found_frequency_hz=48.8,
-    value=30.0,
-    threshold=12.0,
-    unit="-log10 P",
-    confidence=0.99,
-    sample=131071,
-    reason='outer race of bearing_3: 48.8 Hz, "loud"\n',
-)
-FEATURES = Features(
-    7,
-    "rig",
-    "kurtosis",
-    "b3_y",
-    1,
-    2,
-    65536.0,
-    0.0,
-    32768.0,
-    10.0,
-    "tacho",
-    (FeatureValue("rms", "", 3.5, "m/s^2"),),
-)
-ROW = TrendValue(
-    "kurtosis", "b3_y", "", "rms", "m/s^2", 3.5, 2.0, 4.0, 6.0, 0.5, 0.25, 0.75, "rising", 1.0, 3600.0
-)
-TRENDS = Trends(9, "rig", "trend", 131071, "learnt from 60 s", (ROW,))
+ALARM = alarm(reason='outer race of bearing_3: 48.8 Hz, "loud"\n')
+FEATURES = features()
+ROW = trend_value()
+TRENDS = trends(ROW)
 
 
 class Clock:
