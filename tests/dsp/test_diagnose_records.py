@@ -153,3 +153,23 @@ def test_half_the_record_and_any_batch_size_give_the_same_verdict(record_file):
     assert whole.to_json() == again.to_json()
     half = replace(record, data=np.ascontiguousarray(record.data[:, : record.sample_count // 2]))
     assert [f.fault for f in diagnose_record(half, plate).findings] == ["outer_race"]
+
+
+def test_gear0_tells_the_mesh_that_its_nameplate_does_not_list(record_file):
+    record = import_file(record_file("gear0/3027_217_Data_Chan12.mat"), "gear0")
+    diagnosis = diagnose_record(record, load_machine("gear0"))
+    (mesh,) = [q for q in diagnosis.quality if q.issue == "unlisted_mesh"]
+    # 23 teeth at 2000 rpm pass at 766.7 Hz (README of the data set); the line is that of an FFT.
+    assert mesh.channel == "ch12"
+    assert "order 23 (766.6 Hz" in mesh.detail
+    assert "23 teeth on shaft 'pinion'" in mesh.detail
+    assert "strongest at -1" in mesh.detail
+    assert "teeth of both wheels" in mesh.detail
+    assert "lists neither bearings nor pairs of gears" in diagnosis.lines()[-1]
+
+
+def test_measured_records_are_not_said_to_be_sampled_wrongly_nor_to_have_unlisted_gears(record_file):
+    for name, machine, *_ in (*FAULTY[::3], *HEALTHY, *WITHOUT_BEARINGS[1:]):
+        diagnosis = diagnose_record(import_file(record_file(name), machine), load_machine(machine))
+        kinds = {q.issue for q in diagnosis.quality}
+        assert not kinds & {"sampling_rate_doubtful", "unlisted_mesh"}, name

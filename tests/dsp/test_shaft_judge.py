@@ -1,10 +1,14 @@
 """Shafts: unbalance, misalignment, looseness by velocities at low orders."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from judge_signals import gearbox, measured, steady, turns
 
-from gearsim_dsp.judges.shaft import bearing_levels, judge_shafts
+from gearsim_dsp.judges.shaft import bearing_levels, judge_shafts, undecided_orders
+from gearsim_dsp.judges.supply import supply_shares
+from gearsim_dsp.speed import Phase, ShaftSpeed
 
 SPEED_HZ, SECONDS = 20.0, 3.0
 
@@ -67,3 +71,68 @@ def test_levels_of_sound_rigs_are_no_finding(velocity):
 def test_levels_in_an_unknown_unit_are_not_judged():
     _, findings = judge({"in_y": line(1, 9.0), "in_x": line(1, 9.0)}, unit="1")
     assert findings == ()
+
+
+def hum(amplitudes_m_s2, frequency_hz=50.0):
+    """Acceleration that a ground loop feigns: the supply and its multiples."""
+    t = np.arange(round(SECONDS * 16384)) / 16384.0
+    return sum(
+        a * np.cos(2 * np.pi * k * frequency_hz * t + 0.7 * k) for k, a in enumerate(amplitudes_m_s2, 1)
+    )
+
+
+def judge_at(speeds_hz, rows, seed=2):
+    """The same gearbox at a speed that goes evenly from one value to another."""
+    rng = np.random.default_rng(seed)
+    at = np.arange(round(SECONDS * 16384), dtype=float)
+    low, high = speeds_hz
+    angle = (low * at + 0.5 * (high - low) * at**2 / at[-1]) / 16384.0
+    mean = 0.5 * (low + high)
+    speed = ShaftSpeed(mean, (0.9999 * mean, 1.0001 * mean), "tacho", Phase(at[::64], angle[::64]))
+    names = ("in_y", "in_x", "out_y", "out_x")
+    channels = {n: rows.get(n, 0.0) + 0.05 * rng.standard_normal(at.size) for n in names}
+    return measured(gearbox(), channels, speed), angle
+
+
+@pytest.mark.parametrize(("speed_hz", "supply_hz"), [(10.0, 50.0), (12.5, 50.0), (25.0, 50.0), (10.0, 60.0)])
+def test_hum_at_a_whole_order_is_no_misalignment_and_is_told(speed_hz, supply_hz):
+    """5 m/s^2 at 50 Hz read as a velocity are 11 mm/s: order 5 at 10 Hz, 4 at 12.5 Hz, 2 at 25 Hz."""
+    tones = hum((5.0, 1.0, 2.0), supply_hz)
+    box, _ = judge_at((speed_hz, speed_hz), dict.fromkeys(("in_y", "in_x", "out_y", "out_x"), tones))
+    assert judge_shafts(box) == ()
+    told = undecided_orders(box)
+    assert {issue.issue for issue in told} == {"order_or_supply"}
+    assert f"order {supply_hz / speed_hz:g} " in told[0].detail
+
+
+def test_orders_at_hums_place_count_where_the_speed_changes():
+    """Over 5 to 15 Hz order 5 sweeps 50 Hz: what stays in its line is the shaft's."""
+    box, angle = judge_at((5.0, 15.0), {})
+    omega = 2 * np.pi * 50.0
+    order_five = 3e-3 * np.sqrt(2) * omega * np.cos(2 * np.pi * 5 * angle)
+    box, _ = judge_at((5.0, 15.0), {"in_y": order_five, "in_x": order_five})
+    (finding,) = judge_shafts(box)
+    assert finding.fault == "misalignment"
+    assert undecided_orders(box) == ()
+    # The supply itself, though, is averaged out.
+    box, _ = judge_at((5.0, 15.0), dict.fromkeys(("in_y", "in_x"), hum((5.0,))))
+    assert judge_shafts(box) == ()
+
+
+def test_orders_beside_hums_place_carry_their_finding_at_constant_speed():
+    """Jaws speak at order 3, 30 Hz here; the hum at order 5 is told, and takes nothing away."""
+    omega = 2 * np.pi * 30.0
+    box, angle = judge_at((10.0, 10.0), {})
+    jaws = 2e-3 * np.sqrt(2) * omega * np.cos(2 * np.pi * 3 * angle)
+    box, _ = judge_at((10.0, 10.0), {"in_y": jaws + hum((5.0,)), "in_x": jaws})
+    (finding,) = judge_shafts(box)
+    assert (finding.component, finding.fault) == ("input", "misalignment")
+    assert finding.evidence["velocity_mm_s"] == pytest.approx(2.0, rel=0.03)
+    assert len(undecided_orders(box)) == 1
+
+
+def test_the_supply_that_the_nameplate_states_is_the_only_one_in_doubt():
+    box, _ = judge_at((10.0, 10.0), {})
+    stated = replace(box.machine, line_frequency_hz=60.0)
+    shares = supply_shares(replace(box, machine=stated), np.arange(1.0, 9.0))
+    assert np.flatnonzero(shares > 0.5).tolist() == [5]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gearsim_dsp.angle.record_speed import record_speed
+from gearsim_dsp.angle.record_speed import RecordSpeed, record_speed
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.judges.bearing import Verdict, find_faults
@@ -23,6 +23,7 @@ from gearsim_dsp.judges.sizes import with_size
 from gearsim_dsp.judges.strange import find_strange_comb
 from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.quality import QualityIssue, check_levels
+from gearsim_dsp.remarks import record_remarks, what_is_lacking
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
@@ -71,7 +72,7 @@ class DiagnosisSettings:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What is known of a machine after one record."""
+    """What is known of a machine after one record; `angle` is that of its reference shaft over the record."""
 
     speed: ShaftSpeed
     quality: tuple[QualityIssue, ...]
@@ -80,6 +81,8 @@ class Diagnosis:
     source: str = ""
     verdict: Verdict | None = field(default=None, repr=False, compare=False)
     judged_parts: tuple[str, ...] = ()
+    angle: RecordSpeed = field(default=RecordSpeed(None), repr=False, compare=False)
+    lacking: str = ""
 
     @property
     def judged(self) -> bool:
@@ -117,7 +120,8 @@ class Diagnosis:
         if not self.findings:
             # Silence about what was not judged must not read as its health.
             judged = f"no fault found; judged: {', '.join(self.judged_parts)}"
-            lines.append(judged if self.judged else "no fault found: nothing could be judged")
+            nothing = f"no fault found: nothing could be judged{self.lacking}"
+            lines.append(judged if self.judged else nothing)
         return lines
 
 
@@ -197,6 +201,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         supply = plate.line_frequency_hz or 50.0
         strange = find_strange_comb(plate, pool, (supply, 60.0))
         findings = (strange,) if strange else ()
+    notes += record_remarks(record, measured)
     quality = (*angle.issues, *notes, *electrical, *(() if findings else _unexplained(verdict, impulsive)))
     return Diagnosis(
         speed if angle.replaces_angle else verdict.speed,
@@ -206,6 +211,8 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         record.source,
         verdict,
         _judged_parts(measured, verdict),
+        angle,
+        what_is_lacking(plate, measured),
     )
 
 

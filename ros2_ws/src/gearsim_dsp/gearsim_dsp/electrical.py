@@ -18,7 +18,7 @@ from scipy import fft as sfft
 from gearsim_dsp.noise_floor import local_floor
 from gearsim_dsp.spectra import good_length
 
-__all__ = ["ElectricalLines", "find_electrical_lines"]
+__all__ = ["ElectricalLines", "find_electrical_lines", "supply_like_combs"]
 
 _SUPPLIES_HZ = (50.0, 60.0)
 _SUPPLY_DRIFT = 0.002
@@ -66,15 +66,9 @@ def find_electrical_lines(
     machine_error : float
         Relative uncertainty of these.
     """
-    count = good_length(min(int(samples.size), _LONGEST))
-    if count < 2 * sample_rate_hz:
+    power, height_db, step_hz = _heights(samples, sample_rate_hz)
+    if power.size == 0:
         return ElectricalLines(0.0, (), ())
-    x = np.asarray(samples[:count], dtype=np.float64)
-    window = np.hanning(count + 1)[:-1]
-    lines = sfft.rfft((x - x.mean()) * window)
-    power = lines.real**2 + lines.imag**2
-    height_db = 10 * np.log10(np.maximum(power / local_floor(power, _BLOCK_LINES, 1.0, 4), 1e-3))
-    step_hz = sample_rate_hz / count
     known = _Known([f for f in machine_lines_hz if f > 0], machine_error, step_hz)
     supplies = (line_frequency_hz,) if line_frequency_hz > 0 else _SUPPLIES_HZ
     found = [_supply(height_db, step_hz, supply, known) for supply in supplies]
@@ -85,6 +79,61 @@ def find_electrical_lines(
         tuple(found[best]) if enough else (),
         tuple(_carriers(height_db, power / max(float(power.sum()), 1e-300), step_hz, known)),
     )
+
+
+def supply_like_combs(
+    samples: NDArray[np.float32] | NDArray[np.float64],
+    sample_rate_hz: float,
+    range_hz: tuple[float, float],
+    machine_lines_hz: Sequence[float] = (),
+    machine_error: float = 1e-3,
+) -> tuple[tuple[float, int], ...]:
+    """Combs of narrow lines that belong to no shaft, as those of a supply whose frequency is read wrong.
+
+    Parameters
+    ----------
+    samples, sample_rate_hz, machine_lines_hz, machine_error
+        As of `find_electrical_lines`.
+    range_hz : tuple of float
+        Of the fundamental.
+
+    Returns
+    -------
+    tuple of (float, int)
+        Fundamental in Hz and number of lines among its first twelve multiples, most lines first.
+    """
+    _, height_db, step_hz = _heights(samples, sample_rate_hz)
+    known = _Known([f for f in machine_lines_hz if f > 0], machine_error, step_hz)
+    peaks = _peaks(height_db, _SUPPLY_DB) * step_hz if height_db.size else np.zeros(0)
+    low, high = range_hz
+    peaks = peaks[peaks <= _SUPPLY_HARMONICS * high]
+    peaks = np.array([p for p in peaks if not known.explains(float(p))])
+    found: list[tuple[float, int]] = []
+    for number in range(1, _SUPPLY_HARMONICS + 1):
+        for trial in peaks / number:
+            multiple = np.round(peaks / trial)
+            fits = (multiple >= 1) & (multiple <= _SUPPLY_HARMONICS)
+            fits &= np.abs(peaks - multiple * trial) <= 0.75 * step_hz
+            if low <= trial <= high and np.count_nonzero(fits) >= _FEWEST_LINES:
+                # All lines together tell the fundamental better than the one it was tried by.
+                best = float(np.sum(peaks[fits] * multiple[fits]) / np.sum(multiple[fits] ** 2))
+                found.append((best, int(np.count_nonzero(fits))))
+    return tuple(sorted(found, key=lambda one: (-one[1], one[0])))
+
+
+def _heights(
+    samples: NDArray[np.float32] | NDArray[np.float64], sample_rate_hz: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Power and height over the floor [dB] of each line, and their distance; empty below two seconds."""
+    count = good_length(min(int(samples.size), _LONGEST))
+    if count < 2 * sample_rate_hz:
+        return np.zeros(0), np.zeros(0), 1.0
+    x = np.asarray(samples[:count], dtype=np.float64)
+    window = np.hanning(count + 1)[:-1]
+    lines = sfft.rfft((x - x.mean()) * window)
+    power = lines.real**2 + lines.imag**2
+    floor = local_floor(power, _BLOCK_LINES, 1.0, 4)
+    return power, 10 * np.log10(np.maximum(power / floor, 1e-3)), sample_rate_hz / count
 
 
 @dataclass(frozen=True, slots=True)

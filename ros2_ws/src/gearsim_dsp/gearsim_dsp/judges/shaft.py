@@ -9,7 +9,9 @@ misalignment    orders 2 to 8 strong against order 1 (jaws work three times a tu
 looseness       many orders, halves among them, on one bearing's pedestal much more than on the others
 
 The harmonics of a gear mesh lie far above; a wheel off its axis presses along the line of action only, so
-of two directions the weaker one counts where both are measured.
+of two directions the weaker one counts where both are measured. An order on the supply's frequency or a
+multiple of it (order 5 at 10 Hz) adds nothing to a level as long as the speed is constant: it may be hum.
+Such lines are told (`undecided_orders`).
 """
 
 from __future__ import annotations
@@ -25,10 +27,12 @@ from gearsim_dsp.angle.resample import to_angle
 from gearsim_dsp.judges.confidence import confidence
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.measured import Measured
+from gearsim_dsp.judges.supply import supply_shares
+from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.synchronous.tsa import synchronous_average
 from gearsim_io.nameplate import Bearing, Shaft
 
-__all__ = ["BearingLevels", "bearing_levels", "judge_shafts"]
+__all__ = ["BearingLevels", "bearing_levels", "judge_shafts", "undecided_orders"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +47,7 @@ _MODERATE_MM_S, _SEVERE_MM_S = 4.5, 11.2
 _HARMONIC_SHARE = 0.35
 _LOOSE_ORDERS = 6
 _LOOSE_OVER_OTHERS = 2.0
+_SUPPLY_SHARE = 0.1  # of a tone's amplitude: with less of it left in an order, that order is the shaft's
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +62,12 @@ class BearingLevels:
     velocity_mm_s : ndarray, shape (16,)
         RMS at orders 0.5, 1, 1.5 ... 8 of the shaft, of the strongest channel; what does not stand out of the
         noise is 0.
+    sure_mm_s : ndarray, shape (16,)
+        The same without the orders that may be the supply's: levels are made of these.
+    undecided_mm_s : ndarray, shape (16,)
+        RMS at those orders, 0 at the others, each of the channel that has most.
     all_round_mm_s : float
-        Order 1 in the direction in which it is weakest.
+        Order 1 in the direction in which it is weakest; 0 where it may be the supply's.
     directions : int
         Directions measured.
     """
@@ -66,28 +75,30 @@ class BearingLevels:
     bearing: Bearing
     channel: str
     velocity_mm_s: Array
+    sure_mm_s: Array
+    undecided_mm_s: Array
     all_round_mm_s: float
     directions: int
 
     @property
     def first(self) -> float:
         """Order 1."""
-        return float(self.velocity_mm_s[1])
+        return float(self.sure_mm_s[1])
 
     @property
     def harmonics(self) -> float:
         """Orders 2 to 8 together."""
-        return float(np.sqrt(np.sum(self.velocity_mm_s[3::2] ** 2)))
+        return float(np.sqrt(np.sum(self.sure_mm_s[3::2] ** 2)))
 
     @property
     def halves(self) -> float:
         """Orders 0.5, 1.5 ... together."""
-        return float(np.sqrt(np.sum(self.velocity_mm_s[0::2] ** 2)))
+        return float(np.sqrt(np.sum(self.sure_mm_s[0::2] ** 2)))
 
     @property
     def total(self) -> float:
         """All orders together."""
-        return float(np.sqrt(np.sum(self.velocity_mm_s**2)))
+        return float(np.sqrt(np.sum(self.sure_mm_s**2)))
 
     @property
     def count(self) -> int:
@@ -115,19 +126,52 @@ def judge_shafts(measured: Measured) -> tuple[Finding, ...]:
     return tuple(found)
 
 
+def undecided_orders(measured: Measured) -> tuple[QualityIssue, ...]:
+    """Orders that lie on lines of the supply at a constant speed and would weigh if they were the shaft's."""
+    if measured.phase is None or measured.unit != "m/s^2":
+        return ()
+    shafts = [measured.machine.shaft(one.shaft) for one in measured.machine.bearings]
+    if not any(bool(np.any(_may_be_hum(measured, shaft))) for shaft in shafts):
+        return ()
+    issues = []
+    for one in (one for group in bearing_levels(measured).values() for one in group):
+        if float(np.sqrt(np.sum(one.undecided_mm_s**2))) < _HARMONICS_MM_S:
+            continue
+        turn = measured.machine.shaft(one.bearing.shaft).ratio * measured.speed.value_hz
+        told = ", ".join(
+            f"order {0.5 * k:g} ({0.5 * k * turn:.2f} Hz, {v:.2g} mm/s)"
+            for k, v in enumerate(one.undecided_mm_s, 1)
+            if v > 0
+        )
+        detail = f"{told} of shaft {one.bearing.shaft!r} at {one.bearing.name!r}: lines of the supply lie "
+        detail += "there, too, and the speed is constant; which it is cannot be decided, none was counted"
+        issues.append(QualityIssue("order_or_supply", "", detail))
+    return tuple(issues)
+
+
 def bearing_levels(measured: Measured) -> dict[str, list[BearingLevels]]:
     """Velocities at the bearings of each shaft that has sensors near them and turned often enough."""
     found: dict[str, list[BearingLevels]] = {}
+    hum: dict[float, NDArray[np.bool_]] = {}
     for bearing in measured.machine.bearings:
         shaft = measured.machine.shaft(bearing.shaft)
         channels = [name for name in bearing.channels if name in measured.channels]
         if not channels or measured.turns * shaft.ratio < _LEAST_TURNS or bearing.outer_ring_rotates:
             continue
-        rows = {name: _velocities(measured, name, shaft) for name in channels}
+        if shaft.ratio not in hum:
+            hum[shaft.ratio] = _may_be_hum(measured, shaft)
+        every = {name: _velocities(measured, name, shaft) for name in channels}
+        rows = {name: np.where(hum[shaft.ratio], 0.0, row) for name, row in every.items()}
         loudest = max(rows, key=lambda name: float(np.sum(rows[name] ** 2)))
         found.setdefault(shaft.name, []).append(
             BearingLevels(
-                bearing, loudest, rows[loudest], min(float(row[1]) for row in rows.values()), len(rows)
+                bearing,
+                loudest,
+                every[loudest],
+                rows[loudest],
+                np.max([every[name] - rows[name] for name in channels], axis=0),
+                min(float(row[1]) for row in rows.values()),
+                len(rows),
             )
         )
     return found
@@ -144,6 +188,12 @@ def _velocities(measured: Measured, channel: str, shaft: Shaft) -> Array:
     speed = shaft.ratio * measured.speed.value_hz
     velocity = amplitude[lines] / (2 * np.pi * 0.5 * lines * speed) / math.sqrt(2.0) * 1e3
     return np.asarray(np.where(amplitude[lines] > _SURE * noise, velocity, 0.0))
+
+
+def _may_be_hum(measured: Measured, shaft: Shaft) -> NDArray[np.bool_]:
+    """Which of the orders 0.5, 1 ... 8 of a shaft a tone of the supply would come through to."""
+    orders = np.asarray(shaft.ratio * 0.5 * np.arange(1, 2 * _TOP_ORDER + 1), dtype=np.float64)
+    return supply_shares(measured, orders) > _SUPPLY_SHARE
 
 
 def _looseness(measured: Measured, levels: dict[str, list[BearingLevels]]) -> tuple[Finding, ...]:
