@@ -29,7 +29,7 @@ MIN_STEP_RATE_HZ = 131072.0
 MIN_RATE_HZ, MAX_RATE_HZ = 100.0, 1e6
 SETTLING_S = 0.5
 _START_TURNS = 0.5  # so that whole turns of both shafts start from 0
-_BLOCK_SAMPLES = 512
+_BLOCK_SAMPLES = 2048
 
 Sites = Mapping[str, Vector | RotatingSite]
 PROBED = ("displacement_m", "force_n")

@@ -12,7 +12,7 @@ A fluctuation of the load comes on top and is not balanced by the motor: the rot
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,17 +36,17 @@ class Segment:
     motor: Array  # [N m]
     fluctuation: Array  # [N m] of the load
     step_s: float
+    steady: bool = field(init=False)  # whether speed and torques are constant
+
+    def __post_init__(self) -> None:
+        torques = (self.load, self.motor, self.fluctuation)
+        changing = np.any(self.turns[2:]) or any(np.any(one[1:]) for one in torques)
+        object.__setattr__(self, "steady", not changing)
 
     @property
     def length_steps(self) -> float:
         """Steps from its start to its end."""
         return float(self.end_step - self.start_step)
-
-    @property
-    def steady(self) -> bool:
-        """Whether speed and torques are constant."""
-        torques = (self.load, self.motor, self.fluctuation)
-        return not (np.any(self.turns[2:]) or any(np.any(one[1:]) for one in torques))
 
     def _at(self, step: float, coefficients: Array) -> tuple[float, float, float]:
         return plain_polynomial((step - self.start_step) / self.length_steps, coefficients)
