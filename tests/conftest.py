@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 SOURCES = Path(__file__).resolve().parents[1] / "ros2_ws" / "src"
-_FOLDERS = [str(SOURCES / name) for name in ("gearsim_io", "gearsim_sim", "gearsim_dsp", "gearsim_bringup")]
+_ROOMS = ("gearsim_io", "gearsim_sim", "gearsim_dsp", "gearsim_twin", "gearsim_bringup")
+_FOLDERS = [str(SOURCES / name) for name in _ROOMS]
 # The sources are tested, not an older build of them; also in child processes.
 sys.path[:0] = _FOLDERS
 os.environ["PYTHONPATH"] = os.pathsep.join([*_FOLDERS, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)

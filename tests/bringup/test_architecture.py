@@ -14,7 +14,8 @@ ALLOWED = {
     "gearsim_io": set(),
     "gearsim_sim": {"gearsim_io"},
     "gearsim_dsp": {"gearsim_io"},
-    "gearsim_bringup": {"gearsim_io", "gearsim_sim", "gearsim_dsp"},
+    "gearsim_twin": {"gearsim_io", "gearsim_sim", "gearsim_dsp"},
+    "gearsim_bringup": {"gearsim_io", "gearsim_sim", "gearsim_dsp", "gearsim_twin"},
 }
 ROS = ("rclpy", "gearsim_msgs", "std_msgs", "diagnostic_msgs", "rosgraph_msgs", "rcl_interfaces")
 NO_ROS = """

@@ -45,6 +45,7 @@ setup(
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",
+        f"gearsim_twin=={VERSION}",
     ],
     # What `gearsim bench` compares with.
     extras_require={"bench": ["PySDKit==0.5.0", "openconmo==0.0.6"]},

@@ -1,0 +1,3 @@
+"""Measured against simulated: what a simulation gets wrong, why, and the model extended by it."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,36 @@
+"""Builds gearsim_twin. Its name, version, description and maintainer are in package.xml alone."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+HERE = Path(__file__).resolve().parent
+ABOUT = ElementTree.parse(HERE / "package.xml").getroot()
+NAME = ABOUT.findtext("name")
+VERSION = ABOUT.findtext("version")
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description=ABOUT.findtext("description"),
+    license=ABOUT.findtext("license"),
+    author=ABOUT.findtext("maintainer"),
+    maintainer=ABOUT.findtext("maintainer"),
+    maintainer_email=ABOUT.find("maintainer").get("email"),
+    python_requires=">=3.11",
+    packages=find_packages(),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    # What runs without ROS; rclpy and the messages come with ROS, see package.xml.
+    install_requires=[
+        "numpy>=1.26",
+        "scipy>=1.11",
+        f"gearsim_io=={VERSION}",
+        f"gearsim_sim=={VERSION}",
+        f"gearsim_dsp=={VERSION}",
+    ],
+    zip_safe=False,
+)
