@@ -13,6 +13,7 @@ __all__ = [
     "clearance_factor",
     "crest_factor",
     "impulse_factor",
+    "is_signal",
     "kurtosis",
     "peak",
     "rms",
@@ -21,6 +22,11 @@ __all__ = [
 ]
 
 Samples = NDArray[np.float32] | NDArray[np.float64]
+
+
+def is_signal(samples: Samples) -> bool:
+    """True for finite values that are not all the same: what indicators and judges can be asked about."""
+    return bool(np.all(np.isfinite(samples))) and float(np.ptp(samples)) > 0.0
 
 
 def rms(samples: Samples) -> float:

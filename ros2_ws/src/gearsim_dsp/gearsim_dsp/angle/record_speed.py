@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gearsim_dsp.angle.course import Comb, line_score
 from gearsim_dsp.angle.resample import to_angle
 from gearsim_dsp.angle.tacholess import SpeedTrack, speed_limits, track_speed
+from gearsim_dsp.features import is_signal
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.speed import Phase, ShaftSpeed, SpeedSource, window_speed
 from gearsim_io.errors import InputError
@@ -77,10 +78,9 @@ def record_speed(record: Record, machine: Machine) -> RecordSpeed:
         Channels with values that are not finite are left out.
     machine : Machine
     """
-    fine = np.all(np.isfinite(record.data), axis=1) & (np.ptp(record.data, axis=1) > 0)
     known = {channel.name for channel in machine.channels} or set(record.channels)
-    fine &= np.array([name in known for name in record.channels])
-    signals = record.data[fine]
+    named = zip(record.channels, record.data, strict=True)
+    signals = record.data[[name in known and is_signal(samples) for name, samples in named]]
     source: SpeedSource = "tacho" if record.tachos else "encoder"
     trains = record.tachos or tuple(
         PulseTrain(e.shaft, float(e.lines_per_revolution), e.samples) for e in record.encoders

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearsim_dsp.features import is_signal
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.registry import judge_all
@@ -51,9 +52,9 @@ class LiveNames:
 
     def _judge(self, window: Window, speed: ShaftSpeed) -> tuple[Finding, ...]:
         channels: dict[str, np.ndarray] = {
-            name: window.data[row]
-            for row, name in enumerate(window.channels)
-            if np.isfinite(window.data[row]).all() and np.ptp(window.data[row]) > 0
+            name: samples
+            for name, samples in zip(window.channels, window.data, strict=True)
+            if is_signal(samples)
         }
         trains = {train.shaft: train for train in window.pulses}
         measured = Measured(self._machine, window.sample_rate_hz, window.unit, channels, speed, trains)

@@ -14,6 +14,7 @@ import numpy as np
 
 from gearsim_dsp.angle.record_speed import changes, doubt_of_angle
 from gearsim_dsp.angle.tacholess import SpeedTrack, track_speed
+from gearsim_dsp.features import is_signal
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.speed import Phase, ShaftSpeed, SpeedSource, nameplate_speed, window_speed
 from gearsim_dsp.streams.assembler import Window
@@ -163,7 +164,5 @@ class LiveSpeeds:
 
 
 def _sound(window: Window) -> np.ndarray:
-    """Channels that hold finite values and change."""
-    fine = np.all(np.isfinite(window.data), axis=1)
-    fine &= np.ptp(np.where(np.isfinite(window.data), window.data, 0.0), axis=1) > 0
-    return np.asarray(window.data[fine])
+    """Channels that can be judged."""
+    return np.asarray(window.data[[is_signal(samples) for samples in window.data]])
