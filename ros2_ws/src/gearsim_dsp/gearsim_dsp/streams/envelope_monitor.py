@@ -18,11 +18,12 @@ from gearsim_dsp.kinematics import fault_families
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.results import Features, FeatureValue, Spectrum, SpectrumMarker
 from gearsim_dsp.speed import ShaftSpeed
-from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
+from gearsim_dsp.streams.assembler import Window, WindowSettings
 from gearsim_dsp.streams.band_keeper import BandKeeper
 from gearsim_dsp.streams.live_sizes import LiveSizes, width_words
 from gearsim_dsp.streams.report import Report
 from gearsim_dsp.streams.window_speeds import LiveSpeeds, WindowSpeeds
+from gearsim_dsp.streams.windowed_monitor import WindowedMonitor, fatal_words
 from gearsim_dsp.window import BandSpectrum, WindowInput, WindowResult, analyse_window
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
@@ -53,6 +54,9 @@ class EnvelopeSettings:
         Windows from one choice of a band to the next (of another channel); 0: no kurtogram.
     size_every : int
         Windows from one measurement of a spall's width to the next, where there is a finding; 0: none.
+    between : bool
+        Demodulate the bands centred on the borders of the bank's, too: a resonance on a border shows better by a
+        third and more, for nearly twice the time.
     """
 
     window: WindowSettings = field(default_factory=WindowSettings)
@@ -60,6 +64,7 @@ class EnvelopeSettings:
     memory_windows: int = 0
     kurtogram_every: int = 16
     size_every: int = 64
+    between: bool = False
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:
@@ -71,7 +76,7 @@ class EnvelopeSettings:
                 raise InputError("envelope settings", name, getattr(self, name), "0 to 1000")
 
 
-class EnvelopeMonitor:
+class EnvelopeMonitor(WindowedMonitor):
     """Judges each window of a stream by the squared envelope spectra of all channels.
 
     Parameters
@@ -97,10 +102,8 @@ class EnvelopeMonitor:
         source: str = "envelope",
         speeds: WindowSpeeds | None = None,
     ) -> None:
-        self.machine = machine
         self.settings = settings or EnvelopeSettings()
-        self.source = source
-        self.assembler = WindowAssembler(machine, self.settings.window)
+        super().__init__(machine, self.settings.window, source)
         angle = bool(machine.tacho_shafts or machine.encoder_shafts)
         memory = self.settings.memory_windows or (1 if angle else _MEMORY_WITHOUT_ANGLE)
         self._pool = EvidencePool(machine, memory)
@@ -110,28 +113,14 @@ class EnvelopeMonitor:
         self._families = fault_families(machine)
         self._speeds = speeds or LiveSpeeds(machine)
         self._sizes = LiveSizes(machine, self.settings.size_every)
-        self._run = 0
 
-    @property
-    def hop_s(self) -> float:
-        """Distance of two windows, in seconds of signal."""
-        return self.settings.window.hop_s
+    def _restart(self) -> None:
+        self._pool.reset()
+        self._keeper.reset()
+        self._speeds.reset()
+        self._sizes.reset()
 
-    def push(self, batch: Batch) -> list[Report]:
-        """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
-        return [self._report(window) for window in self.assembler.push(batch)]
-
-    def finish(self) -> list[Report]:
-        """The end of the input: reports of the windows that still waited for something."""
-        return [self._report(window) for window in self.assembler.finish()]
-
-    def _report(self, window: Window) -> Report:
-        if window.run != self._run:
-            self._pool.reset()
-            self._keeper.reset()
-            self._speeds.reset()
-            self._sizes.reset()
-            self._run = window.run
+    def _judge(self, window: Window) -> Report:
         speed = self._speeds.of(window)
         self._keeper.renew(window, speed.value_hz)
         results = [self._analyse(window, row, speed) for row in range(len(window.channels))]
@@ -141,20 +130,16 @@ class EnvelopeMonitor:
         self._pool.add(results)
         verdict = find_faults(self.machine, self._pool)
         judged = any(result.spectra for result in results)
-        return Report(
-            run=window.run,
-            first_sample=window.first_sample,
-            end_sample=window.end_sample,
-            last_ns=window.last_ns,
-            frame_id=self.machine.name,
-            features=tuple(self._features(window, result, verdict) for result in results if result.spectra),
-            spectra=tuple(self._spectrum(window, result, verdict) for result in results if result.spectra),
+        return self._report(
+            window,
+            features=(self._of_result(window, result, verdict) for result in results if result.spectra),
+            spectra=(self._spectrum(window, result, verdict) for result in results if result.spectra),
             indications=indications(verdict, self._widths(window, verdict, speed)) if judged else (),
             tests=1,
             judged=judged,
-            note="" if judged else self._why_not(quality, speed),
+            note=self._why_not(quality, speed),
             quality=quality,
-            results=tuple(results),
+            results=results,
         )
 
     def _analyse(self, window: Window, row: int, speed: ShaftSpeed) -> WindowResult:
@@ -169,6 +154,7 @@ class EnvelopeMonitor:
                 speed=speed,
                 machine=self.machine,
                 bands=() if band is None else (band,),
+                between=self.settings.between,
             )
         )
 
@@ -181,9 +167,8 @@ class EnvelopeMonitor:
         }
 
     def _why_not(self, quality: tuple[QualityIssue, ...], speed: ShaftSpeed) -> str:
-        fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
-        if fatal:
-            return "; ".join(fatal[:3])
+        if fatal := fatal_words(quality):
+            return fatal
         if self._speeds.lost:
             return "the speed changes, and was not found in the vibration of this window"
         if not self.machine.bearings:
@@ -192,7 +177,7 @@ class EnvelopeMonitor:
             return "the speed is not known: no tacho and no nominal speed on the nameplate"
         return "no envelope spectrum could be made"
 
-    def _features(self, window: Window, result: WindowResult, verdict: Verdict) -> Features:
+    def _of_result(self, window: Window, result: WindowResult, verdict: Verdict) -> Features:
         band = self._shown(result, verdict)
         values = [
             FeatureValue("band_kurtosis", "", band.kurtosis, "1"),
@@ -204,20 +189,7 @@ class EnvelopeMonitor:
             values.append(FeatureValue(f"{stem}_snr", names, evidence.snr_db, "dB"))
             values.append(FeatureValue(f"{stem}_modulation", names, evidence.modulation, "1"))
             values.append(FeatureValue(f"{stem}_significance", names, significance(evidence), "-log10 P"))
-        return Features(
-            t0_ns=window.t0_ns,
-            frame_id=self.machine.name,
-            source=self.source,
-            channel=result.channel,
-            first_sample=window.first_sample,
-            sample_count=window.sample_count,
-            sample_rate_hz=window.sample_rate_hz,
-            band_low_hz=band.band.low_hz,
-            band_high_hz=band.band.high_hz,
-            speed_hz=verdict.speed.value_hz,
-            speed_source=verdict.speed.source,
-            values=tuple(values),
-        )
+        return self._features(window, result.channel, values, verdict.speed, band.band)
 
     def _spectrum(self, window: Window, result: WindowResult, verdict: Verdict) -> Spectrum:
         band = self._shown(result, verdict)

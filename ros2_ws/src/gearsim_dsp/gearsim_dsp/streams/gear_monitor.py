@@ -15,16 +15,19 @@ import numpy as np
 
 from gearsim_dsp.alarms import Indication
 from gearsim_dsp.angle.tacholess import track_speed
+from gearsim_dsp.features import is_signal
 from gearsim_dsp.quality import QualityIssue, check_samples
-from gearsim_dsp.results import Features, FeatureValue
-from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
-from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
+from gearsim_dsp.results import FeatureValue
+from gearsim_dsp.speed import ShaftSpeed
+from gearsim_dsp.streams.assembler import Window, WindowSettings
 from gearsim_dsp.streams.baseline import Baseline, Key, Standing, speed_step
 from gearsim_dsp.streams.baseline_keeper import BaselineKeeper
 from gearsim_dsp.streams.feature_kinds import kind_of
 from gearsim_dsp.streams.gear_window import Place, WheelsResult, analyse_wheels, places_of, thinned
 from gearsim_dsp.streams.live_names import LiveNames, looks_like
 from gearsim_dsp.streams.report import Report
+from gearsim_dsp.streams.window_speeds import LiveSpeeds
+from gearsim_dsp.streams.windowed_monitor import WindowedMonitor, fatal_words
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 
@@ -89,7 +92,7 @@ class _Row:
     peak_turn: float
 
 
-class GearMonitor:
+class GearMonitor(WindowedMonitor):
     """Judges each window of a stream by the synchronous averages of all shafts.
 
     Parameters
@@ -111,39 +114,22 @@ class GearMonitor:
         source: str = "gear",
         baseline: Baseline | None = None,
     ) -> None:
-        self.machine = machine
         self.settings = settings or GearSettings()
-        self.source = source
-        self.assembler = WindowAssembler(machine, self.settings.window)
+        super().__init__(machine, self.settings.window, source)
         self.keeper = BaselineKeeper(
             machine.name, self.settings.learn_s, baseline, self.settings.learn_at_start
         )
         self._places = places_of(machine)
         self._names = LiveNames(machine)
         self._references: dict[tuple[str, str, int], _Reference] = {}
-        self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
-        self._run = 0
+        self._speeds = LiveSpeeds(machine, follow=False)
 
-    @property
-    def hop_s(self) -> float:
-        """Distance of two windows, in seconds of signal."""
-        return self.settings.window.hop_s
+    def _restart(self) -> None:
+        self.keeper.restart()
+        self._names.reset()
 
-    def push(self, batch: Batch) -> list[Report]:
-        """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
-        return [self._report(window) for window in self.assembler.push(batch)]
-
-    def finish(self) -> list[Report]:
-        """The end of the input: reports of the windows that still waited for something."""
-        return [self._report(window) for window in self.assembler.finish()]
-
-    def _report(self, window: Window) -> Report:
-        if window.run != self._run:
-            self._run = window.run
-            self.keeper.restart()
-            self._names.reset()
-        length, rate_hz = window.sample_count, window.sample_rate_hz
-        speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+    def _judge(self, window: Window) -> Report:
+        speed = self._speeds.of(window)
         if speed.phase is None:
             speed = self._followed(window, speed)
         quality: list[QualityIssue] = []
@@ -160,22 +146,16 @@ class GearMonitor:
                 why = f"{error}; a longer window_s helps"
         self.keeper.advance(window.last_ns)
         known = [row for row in rows if row.standing is not None]
-        fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
-        return Report(
-            run=window.run,
-            first_sample=window.first_sample,
-            end_sample=window.end_sample,
-            last_ns=window.last_ns,
-            frame_id=self.machine.name,
-            features=tuple(self._features(window, channel, rows, speed) for channel in _channels(rows)),
-            spectra=(),
+        return self._report(
+            window,
+            features=(
+                self._features(window, channel, _values(rows, channel), speed) for channel in _channels(rows)
+            ),
             indications=self._told(window, speed, known),
             tests=self.keeper.tests,
             judged=bool(known),
-            note=""
-            if known
-            else why or "; ".join(fatal[:3]) or self.keeper.why_not(speed.value_hz, self.source),
-            quality=tuple(quality),
+            note=why or fatal_words(quality) or self.keeper.why_not(speed.value_hz, self.source),
+            quality=quality,
         )
 
     def _told(self, window: Window, speed: ShaftSpeed, known: list[_Row]) -> tuple[Indication, ...]:
@@ -189,11 +169,11 @@ class GearMonitor:
 
     def _followed(self, window: Window, speed: ShaftSpeed) -> ShaftSpeed:
         """Angle and speed found in the vibration of the window, where it gives them with confidence."""
-        finite = [row for row in window.data if np.isfinite(row).all() and np.ptp(row) > 0]
-        if not finite or not any(place.wheels for place in self._places):
+        fit = [samples for samples in window.data if is_signal(samples)]
+        if not fit or not any(place.wheels for place in self._places):
             return speed
         try:
-            signals = np.stack(finite[:_FOLLOWED])
+            signals = np.stack(fit[:_FOLLOWED])
             track = track_speed(signals, window.sample_rate_hz, self.machine)
         except InputError as error:
             return replace(speed, note=str(error))
@@ -249,26 +229,13 @@ class GearMonitor:
             rows.append(_Row(key, value, unit, standing, result.peak_turn))
         return rows
 
-    def _features(self, window: Window, channel: str, rows: list[_Row], speed: ShaftSpeed) -> Features:
-        values = [FeatureValue(r.key[3], r.key[2], r.value, r.unit) for r in rows if r.key[1] == channel]
-        return Features(
-            t0_ns=window.t0_ns,
-            frame_id=self.machine.name,
-            source=self.source,
-            channel=channel,
-            first_sample=window.first_sample,
-            sample_count=window.sample_count,
-            sample_rate_hz=window.sample_rate_hz,
-            band_low_hz=0.0,
-            band_high_hz=0.5 * window.sample_rate_hz,
-            speed_hz=speed.value_hz,
-            speed_source=speed.source,
-            values=tuple(values),
-        )
-
 
 def _channels(rows: list[_Row]) -> list[str]:
     return list(dict.fromkeys(row.key[1] for row in rows))
+
+
+def _values(rows: list[_Row], channel: str) -> list[FeatureValue]:
+    return [FeatureValue(r.key[3], r.key[2], r.value, r.unit) for r in rows if r.key[1] == channel]
 
 
 def _indications(rows: list[_Row]) -> tuple[Indication, ...]:

@@ -15,9 +15,11 @@ from gearsim_dsp.features import crest_factor, kurtosis, rms
 from gearsim_dsp.impulsiveness import FULL_MODULATION_KURTOSIS, impulsiveness
 from gearsim_dsp.quality import QualityIssue, check_samples
 from gearsim_dsp.results import Features, FeatureValue
-from gearsim_dsp.speed import ShaftSpeed, SpeedSource, window_speed
-from gearsim_dsp.streams.assembler import Batch, Window, WindowAssembler, WindowSettings
+from gearsim_dsp.speed import ShaftSpeed
+from gearsim_dsp.streams.assembler import Window, WindowSettings
 from gearsim_dsp.streams.report import Report
+from gearsim_dsp.streams.window_speeds import LiveSpeeds
+from gearsim_dsp.streams.windowed_monitor import WindowedMonitor, fatal_words
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Machine
 
@@ -66,7 +68,7 @@ class _Channel:
     significance: float
 
 
-class KurtosisMonitor:
+class KurtosisMonitor(WindowedMonitor):
     """Tells impacts of whatever origin; it names no component.
 
     Parameters
@@ -81,28 +83,12 @@ class KurtosisMonitor:
     def __init__(
         self, machine: Machine, settings: KurtosisSettings | None = None, source: str = "kurtosis"
     ) -> None:
-        self.machine = machine
         self.settings = settings or KurtosisSettings()
-        self.source = source
-        self.assembler = WindowAssembler(machine, self.settings.window)
-        self._angle: SpeedSource = "tacho" if machine.tacho_shafts else "encoder"
+        super().__init__(machine, self.settings.window, source)
+        self._speeds = LiveSpeeds(machine, follow=False)
 
-    @property
-    def hop_s(self) -> float:
-        """Distance of two windows, in seconds of signal."""
-        return self.settings.window.hop_s
-
-    def push(self, batch: Batch) -> list[Report]:
-        """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
-        return [self._report(window) for window in self.assembler.push(batch)]
-
-    def finish(self) -> list[Report]:
-        """The end of the input: reports of the windows that still waited for something."""
-        return [self._report(window) for window in self.assembler.finish()]
-
-    def _report(self, window: Window) -> Report:
-        length, rate_hz = window.sample_count, window.sample_rate_hz
-        speed = window_speed(window.pulses, length, rate_hz, self.machine, self._angle)
+    def _judge(self, window: Window) -> Report:
+        speed = self._speeds.of(window)
         quality: list[QualityIssue] = []
         channels: list[_Channel] = []
         for row, name in enumerate(window.channels):
@@ -110,20 +96,14 @@ class KurtosisMonitor:
             quality += issues
             if not any(issue.fatal for issue in issues):
                 channels.append(self._channel(window, row, speed))
-        fatal = sorted({f"{issue.channel}: {issue.detail}" for issue in quality if issue.fatal})
-        return Report(
-            run=window.run,
-            first_sample=window.first_sample,
-            end_sample=window.end_sample,
-            last_ns=window.last_ns,
-            frame_id=self.machine.name,
-            features=tuple(f for c in channels for f in self._features(window, c, speed)),
-            spectra=(),
+        return self._report(
+            window,
+            features=(f for c in channels for f in self._both_features(window, c, speed)),
             indications=_indications(channels),
             tests=len(window.channels) * self._band_count,
             judged=bool(channels),
-            note="" if channels else "; ".join(fatal[:3]),
-            quality=tuple(quality),
+            note=fatal_words(quality),
+            quality=quality,
         )
 
     @property
@@ -164,7 +144,7 @@ class KurtosisMonitor:
         wanted = int(turns) if math.isfinite(turns) else _MOST_BLOCKS // 2
         return min(max(wanted, _FEWEST_BLOCKS), _MOST_BLOCKS, max(samples // 8, 5))
 
-    def _features(self, window: Window, channel: _Channel, speed: ShaftSpeed) -> tuple[Features, Features]:
+    def _both_features(self, window: Window, channel: _Channel, speed: ShaftSpeed) -> tuple[Features, ...]:
         """Of the whole channel, and of its most impulsive band."""
         whole = (
             FeatureValue("rms", "", channel.rms, window.unit),
@@ -177,25 +157,10 @@ class KurtosisMonitor:
             FeatureValue("band_kurtosis_steady", "", channel.steady_kurtosis, "1"),
             FeatureValue("impulsiveness_significance", "", channel.significance, "-log10 P"),
         )
-        all_hz = Band(0.0, 0.5 * window.sample_rate_hz, "whole")
-        one, two = (
-            Features(
-                t0_ns=window.t0_ns,
-                frame_id=self.machine.name,
-                source=self.source,
-                channel=channel.name,
-                first_sample=window.first_sample,
-                sample_count=window.sample_count,
-                sample_rate_hz=window.sample_rate_hz,
-                band_low_hz=band.low_hz,
-                band_high_hz=band.high_hz,
-                speed_hz=speed.value_hz,
-                speed_source=speed.source,
-                values=values,
-            )
-            for band, values in ((all_hz, whole), (channel.band, part))
+        return (
+            self._features(window, channel.name, whole, speed),
+            self._features(window, channel.name, part, speed, channel.band),
         )
-        return one, two
 
 
 def _indications(channels: list[_Channel]) -> tuple[Indication, ...]:
