@@ -1,0 +1,79 @@
+"""What a cause is: physics that the model may lack, its parameters, and what it would show.
+
+A cause changes the *content* of a scenario (the mapping that a scenario file holds), so that whatever the
+simulator can do is within reach and the extended model is a file that `simulate` and the live rig accept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from gearsim_twin.causes.prior import Prior
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+Content = dict[str, Any]
+"""What a scenario file holds."""
+Values = Mapping[str, float | str]
+"""Numbers of the parameters (SI units) and words of what is chosen, such as `component`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number of a cause.
+
+    Attributes
+    ----------
+    name : str
+        With its unit, as in `width_m`.
+    unit : str
+        As people read it: `m`, `Hz`, `1`.
+    prior : Prior
+        What is known of it beforehand, with bounds.
+    step : float
+        Change for differences between simulations, in the unit of the parameter: large enough to be seen in
+        the features, small enough that they change in proportion. 0 takes a quarter of the prior's
+        standard deviation.
+    """
+
+    name: str
+    unit: str
+    prior: Prior
+    step: float = 0.0
+
+
+class Cause(Protocol):
+    """Physics that the model may lack.
+
+    Attributes
+    ----------
+    name : str
+        One of the published names.
+    parameters : tuple of Parameter
+        What is fitted.
+    confused_with : tuple of (str, str)
+        Causes that leave much the same traces in one record, and the measurement that would decide.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    confused_with: tuple[tuple[str, str], ...]
+
+    def applies(self, context: Context) -> bool:
+        """Whether machine and model can have it at all, and the data do not rule it out."""
+
+    def starts(self, context: Context) -> list[dict[str, float | str]]:
+        """First guesses read off the data, best first, at most four; empty where nothing speaks for it.
+
+        A start gives every parameter a number, and beyond them the words of choices, such as `component`.
+        Each start costs a simulation.
+        """
+
+    def extend(self, content: Content, values: Values, context: Context) -> Content:
+        """A new content with the cause in it; `content` is not changed, and nothing but arguments counts."""
+
+    def signature(self, values: Values) -> str:
+        """What it shows, in plain words with frequencies, orders and times."""
