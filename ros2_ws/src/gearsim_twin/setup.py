@@ -28,6 +28,7 @@ setup(
     install_requires=[
         "numpy>=1.26",
         "scipy>=1.11",
+        "pydantic>=2",
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",
         f"gearsim_dsp=={VERSION}",
