@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from gearsim_dsp.results import Alarm
 from gearsim_dsp.streams.report import AlarmedMonitor
-from gearsim_io.errors import InputError
+from gearsim_io.nodes.answers import answer
 
 Change = Callable[[Callable[[AlarmedMonitor], list[Alarm]]], list[Alarm]]
 
@@ -35,18 +35,12 @@ class AlarmServices:
     def _reset(self, request: Any, response: Any) -> Any:
         return self._answer(response, "reset", lambda m: m.clear(request.alarm_id, request.by))
 
-    def _answer(self, response: Any, done: str, act: Callable[[AlarmedMonitor], list[Alarm]]) -> Any:
-        try:
-            alarms = self._change(act)
-            response.alarm_ids = [alarm.alarm_id for alarm in alarms]
-            response.message = f"{done}: {', '.join(response.alarm_ids) or 'nothing, no alarm waits for it'}"
-            response.success = True
-            self._logger.info(response.message)
-        except InputError as error:
-            response.message = " ".join(str(error).split())
-            response.success = False
-            self._logger.warning(response.message)
-        return response
+    def _answer(self, response: Any, done: str, change: Callable[[AlarmedMonitor], list[Alarm]]) -> Any:
+        def act() -> str:
+            response.alarm_ids = [alarm.alarm_id for alarm in self._change(change)]
+            return f"{done}: {', '.join(response.alarm_ids) or 'nothing, no alarm waits for it'}"
+
+        return answer(response, self._logger, act)
 
 
 class BaselineService:
@@ -58,12 +52,6 @@ class BaselineService:
         self._service = node.create_service(LearnBaseline, "~/learn_baseline", self._answer)
 
     def _answer(self, request: Any, response: Any) -> Any:
-        try:
-            response.message = self._learn(float(request.seconds), bool(request.extend))
-            response.success = True
-            self._logger.info(response.message)
-        except InputError as error:
-            response.message = " ".join(str(error).split())
-            response.success = False
-            self._logger.warning(response.message)
-        return response
+        return answer(
+            response, self._logger, lambda: self._learn(float(request.seconds), bool(request.extend))
+        )

@@ -10,6 +10,7 @@ from gearsim_msgs.srv import ClearFault, InjectFault, SetOperatingPoint
 from rclpy.node import Node
 
 from gearsim_io.errors import InputError
+from gearsim_io.nodes.answers import answer
 from gearsim_sim.events import FaultSpec
 from gearsim_sim.simulation import Simulation
 
@@ -36,7 +37,7 @@ class RigServices:
             parts += [] if load_nm is None else [f"load {load_nm:g} N m"]
             return f"{', '.join(parts)} from sample {response.sample}"
 
-        return self._answer(response, act)
+        return answer(response, self._logger, act)
 
     def _inject_fault(self, request: Any, response: Any) -> Any:
         def act() -> str:
@@ -45,25 +46,14 @@ class RigServices:
             response.fault_id = fault.name
             return f"fault {fault.name} from sample {response.sample}"
 
-        return self._answer(response, act)
+        return answer(response, self._logger, act)
 
     def _clear_fault(self, request: Any, response: Any) -> Any:
         def act() -> str:
             response.sample = self._simulation.clear(request.fault_id, _ramp(request))
             return f"{request.fault_id or 'all faults'} cleared from sample {response.sample}"
 
-        return self._answer(response, act)
-
-    def _answer(self, response: Any, act: Any) -> Any:
-        try:
-            response.message = act()
-            response.success = True
-            self._logger.info(response.message)
-        except InputError as error:
-            response.message = " ".join(str(error).split())
-            response.success = False
-            self._logger.warning(response.message)
-        return response
+        return answer(response, self._logger, act)
 
 
 def _fault(request: Any) -> FaultSpec:
