@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gearsim_dsp.nodes.base import MonitorNode
-from gearsim_dsp.nodes.parameters import MonitorParameters
+from gearsim_dsp.nodes.parameters import BandParameters
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
 from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_io.nameplate import Machine
@@ -16,16 +16,13 @@ _DEFAULT = EnvelopeSettings()
 
 
 @dataclass(frozen=True)
-class EnvelopeParameters(MonitorParameters):
+class EnvelopeParameters(BandParameters):
     """Parameters of the envelope node."""
 
-    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
-    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
     memory_windows: int = parameter(0, "windows averaged for a judgement; 0: automatic", 0, 1000)
     kurtogram_every: int = parameter(
         _DEFAULT.kurtogram_every, "windows from one choice of a band to the next; 0: none", 0, 1000
     )
-
     size_every: int = parameter(
         _DEFAULT.size_every, "windows from one measurement of a spall's width to the next; 0: none", 0, 1000
     )
@@ -37,10 +34,8 @@ class EnvelopeParameters(MonitorParameters):
 
     def envelope_settings(self) -> EnvelopeSettings:
         """The part for the monitor."""
-        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
-        band = None if automatic else (self.band_low_hz, self.band_high_hz)
         return EnvelopeSettings(
-            self.window_settings(), band, self.memory_windows, self.kurtogram_every, self.size_every
+            self.window_settings(), self.band_hz, self.memory_windows, self.kurtogram_every, self.size_every
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gearsim_dsp.nodes.base import MonitorNode
-from gearsim_dsp.nodes.parameters import MonitorParameters
+from gearsim_dsp.nodes.parameters import BandParameters
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_io.nameplate import Machine
@@ -15,11 +15,9 @@ SOURCE = "kurtosis"
 
 
 @dataclass(frozen=True)
-class KurtosisParameters(MonitorParameters):
+class KurtosisParameters(BandParameters):
     """Parameters of the kurtosis node."""
 
-    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
-    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
     bands: int = parameter(8, "bands of equal width that the spectrum is cut into", 1, 64)
 
     def check(self) -> None:
@@ -29,9 +27,7 @@ class KurtosisParameters(MonitorParameters):
 
     def kurtosis_settings(self) -> KurtosisSettings:
         """The part for the monitor."""
-        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
-        band = None if automatic else (self.band_low_hz, self.band_high_hz)
-        return KurtosisSettings(self.window_settings(), self.bands, band)
+        return KurtosisSettings(self.window_settings(), self.bands, self.band_hz)
 
 
 def make_monitor(machine: Machine, parameters: KurtosisParameters) -> AlarmedMonitor:

@@ -66,3 +66,17 @@ class MonitorParameters(AlarmParameters):
     def window_settings(self) -> WindowSettings:
         """The part for the assembler."""
         return WindowSettings(self.window_s, self.hop_s, self.angle_wait_s)
+
+
+@dataclass(frozen=True)
+class BandParameters(MonitorParameters):
+    """Parameters of a node that may be told which band to look at."""
+
+    band_low_hz: float = parameter(0.0, "lower edge of a band to look at; both 0: automatic", 0.0, 1e7)
+    band_high_hz: float = parameter(0.0, "upper edge of that band [Hz]", 0.0, 1e7)
+
+    @property
+    def band_hz(self) -> tuple[float, float] | None:
+        """The band asked for; None where it is to be found."""
+        automatic = self.band_low_hz == 0 and self.band_high_hz == 0
+        return None if automatic else (self.band_low_hz, self.band_high_hz)
