@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from gearsim_bringup.diagnosis_report.folder import check_folder, placed
+from gearsim_bringup.diagnosis_report.material import Material
 from gearsim_bringup.diagnosis_report.page import PLOTLY, make_page, script_safe
 from gearsim_bringup.diagnosis_report.plot import axis, extremes, packed, strongest
 from gearsim_bringup.diagnosis_report.trend import fault_level
@@ -96,6 +97,13 @@ def test_the_verdict_is_told_in_words_and_numbers(report):
     assert json.loads((report.file.parent / VERDICT).read_text()) == json.loads(
         json.dumps(report.diagnosis.to_json())
     )
+
+
+def test_plots_are_drawn_over_the_angle_that_the_diagnosis_has(report, simulated):
+    material = Material.of(*simulated, report.diagnosis)
+    assert material.turning.source == "tacho"
+    assert material.phase is material.turning.phase is report.diagnosis.angle.speed.phase is not None
+    assert "angle" not in json.dumps(report.diagnosis.to_json())
 
 
 def test_the_fault_stands_at_its_line_in_the_envelope(report):

@@ -9,6 +9,7 @@ import pytest
 from gearsim_bringup.diagnosis_report.material import Material
 from gearsim_bringup.diagnosis_report.tooth import draw_turn
 from gearsim_bringup.diagnosis_report.words import evidence_rows, fault_name, meaning
+from gearsim_dsp.angle.record_speed import record_speed
 from gearsim_dsp.diagnose import Diagnosis
 from gearsim_dsp.judges.finding import Finding, Size
 from gearsim_dsp.speed import ShaftSpeed
@@ -19,8 +20,10 @@ def _material(name: str, seconds: float) -> Material:
     from gearsim_sim.simulation import to_record
 
     scenario = load_scenario(name)
+    record = to_record(scenario, seconds)
     speed = ShaftSpeed(scenario.speed_hz, (scenario.speed_hz, scenario.speed_hz), "tacho")
-    return Material.of(to_record(scenario, seconds), scenario.machine, Diagnosis(speed, (), ()))
+    diagnosis = Diagnosis(speed, (), (), angle=record_speed(record, scenario.machine))
+    return Material.of(record, scenario.machine, diagnosis)
 
 
 def _finding(fault: str, component: str, channel: str, **evidence: object) -> Finding:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_bringup.diagnosis_report.lines import expected_marks, finding_marks
+from gearsim_bringup.diagnosis_report.lines import drawn, expected_marks, finding_marks
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, comb, curve, packed, strongest
+from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, curve, packed, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.band_choice import usable_ceiling_hz
 from gearsim_dsp.cyclic.averaging import averaged_coherence
@@ -107,20 +107,4 @@ def _marked(material: Material, top: float, scale: float, rise: tuple[float, flo
     marks = [m for n, f in enumerate(material.diagnosis.findings) if "band_hz" in f.evidence
              for m in finding_marks(material, n, f, 4)]  # fmt: skip
     marks += expected_marks(material, 2, "legendonly" if marks else True)
-    found = []
-    for mark in marks:
-        places = [place * scale for place in mark.places if place * scale < top]
-        if places:
-            found.append(
-                comb(
-                    places,
-                    *rise,
-                    mark.name,
-                    mark.colour,
-                    dash=mark.dash,
-                    visible=mark.visible,
-                    yaxis="y2",
-                    opacity=0.7,
-                )
-            )
-    return found
+    return drawn(marks, top, rise, scale, yaxis="y2", opacity=0.7)

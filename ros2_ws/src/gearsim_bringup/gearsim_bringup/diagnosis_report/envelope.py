@@ -10,12 +10,13 @@ from scipy.special import gammainccinv
 
 from gearsim_bringup.diagnosis_report.lines import (
     Marks,
+    drawn,
     expected_marks,
     finding_marks,
     shaft_marks,
 )
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, Plot, axis, comb, curve, strongest
+from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, Plot, axis, curve, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.cyclic.envelope_spectra import squared_envelope_spectrum
@@ -115,21 +116,7 @@ def _drawn(
         curve(depth, first, length * spectrum.step, "envelope spectrum", BLUE),
         curve(noise, 0.0, stretch * spectrum.step, "noise, 1 in 1000", GREY, width=1.0),
     ]
-    for mark in marks:
-        places = [place * scale for place in mark.places if place * scale < end]
-        if places:
-            data.append(
-                comb(
-                    places,
-                    0.0,
-                    high,
-                    mark.name,
-                    mark.colour,
-                    dash=mark.dash,
-                    visible=mark.visible,
-                    opacity=0.55,
-                )
-            )
+    data += drawn(marks, end, (0.0, high), scale, opacity=0.55)
     if spectrum.unit == "order":
         label = f"order of {shaft_words(material.machine.reference_shaft)} (1 = {material.speed_hz:.4g} Hz)"
     else:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from gearsim_bringup.diagnosis_report.material import BEARING_FAULTS, Material
-from gearsim_bringup.diagnosis_report.plot import FOUND, GREEN, GREY, ORANGE
+from gearsim_bringup.diagnosis_report.plot import FOUND, GREEN, GREY, ORANGE, comb
 from gearsim_bringup.diagnosis_report.words import fault_name, shaft_words
 from gearsim_dsp.judges.finding import Finding
 
 __all__ = [
     "Marks",
     "all_marks",
+    "drawn",
     "expected_marks",
     "finding_marks",
     "gear_marks",
@@ -36,6 +37,19 @@ class Marks:
     colour: str
     dash: str
     visible: bool | Literal["legendonly"] = True
+
+
+def drawn(
+    marks: Iterable[Marks], end: float, rise: tuple[float, float], scale: float = 1.0, **style: Any
+) -> list[dict[str, Any]]:
+    """Vertical lines as high as `rise` at all places below `end` of an axis in orders times `scale`."""
+    found = []
+    for mark in marks:
+        places = [place * scale for place in mark.places if place * scale < end]
+        if places:
+            look = {"dash": mark.dash, "visible": mark.visible, **style}
+            found.append(comb(places, *rise, mark.name, mark.colour, **look))
+    return found
 
 
 def all_marks(material: Material) -> Iterator[Marks]:

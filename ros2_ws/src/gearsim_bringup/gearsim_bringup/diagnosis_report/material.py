@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_dsp.angle.record_speed import record_speed
 from gearsim_dsp.diagnose import Diagnosis
 from gearsim_dsp.families import FamilyEvidence
+from gearsim_dsp.features import is_signal
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import fault_families, mesh_orders
 from gearsim_dsp.planet_kinematics import planetary_orders
@@ -70,13 +70,12 @@ class Material:
     @classmethod
     def of(cls, record: Record, machine: Machine, diagnosis: Diagnosis) -> Material:
         """Put together what belongs to a diagnosis of `record`."""
-        plate = machine_for(record, machine)
-        angle = record_speed(record, plate)
+        plate, angle = machine_for(record, machine), diagnosis.angle
         known = {channel.name for channel in plate.channels} or set(record.channels)
         channels: dict[str, Samples] = {
-            name: row
-            for name, row in zip(record.channels, record.data, strict=True)
-            if name in known and bool(np.all(np.isfinite(row))) and float(np.ptp(row)) > 0.0
+            name: samples
+            for name, samples in zip(record.channels, record.data, strict=True)
+            if name in known and is_signal(samples)
         }
         phase = None
         if angle.speed is not None and (angle.replaces_angle or angle.speed.source in ("tacho", "encoder")):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from scipy import fft as sfft
 
-from gearsim_bringup.diagnosis_report.lines import all_marks
+from gearsim_bringup.diagnosis_report.lines import all_marks, drawn
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, comb, curve, strongest
+from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, curve, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
 from gearsim_dsp.angle.resample import to_angle
 from gearsim_io.errors import InputError
@@ -37,10 +37,7 @@ def draw_orders(material: Material) -> Plot:
     high = 2 * float(level.max())
     low = max(float(np.quantile(level, 0.02)) / 2, high * 1e-6)
     data = [curve(level, step + 0.5 * (length - 1) * step, length * step, material.channel, BLUE)]
-    for mark in all_marks(material):
-        places = [place for place in mark.places if place < top]
-        if places:
-            data.append(comb(places, low, high, mark.name, mark.colour, dash=mark.dash, visible=mark.visible))
+    data += drawn(all_marks(material), top, (low, high))
     reference = material.machine.reference_shaft
     layout = {
         "xaxis": axis(f"order of {shaft_words(reference)}", 0.0, top),

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gearsim_bringup.diagnosis_report.lines import all_marks
+from gearsim_bringup.diagnosis_report.lines import all_marks, drawn
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, Plot, axis, comb, curve, strongest
+from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, Plot, axis, curve, strongest
 from gearsim_dsp.spectra import welch_psd
 
 __all__ = ["draw_low_spectrum", "draw_spectrum"]
@@ -58,12 +58,7 @@ def draw_low_spectrum(material: Material) -> Plot:
     low, high = _ends(level)
     data = [curve(level, psd.step_hz + 0.5 * (step - psd.step_hz), step, material.channel, BLUE)]
     if math.isfinite(material.speed_hz):
-        for mark in all_marks(material):
-            places = [p for p in (np.array(mark.places) * material.speed_hz).tolist() if p < top]
-            if places:
-                data.append(
-                    comb(places, low, high, mark.name, mark.colour, dash=mark.dash, visible=mark.visible)
-                )
+        data += drawn(all_marks(material), top, (low, high), material.speed_hz)
     layout = {
         "xaxis": axis("frequency, Hz", 0.0, top),
         "yaxis": axis(material.density_unit, low, high, type="log", exponentformat="power", dtick=1),
