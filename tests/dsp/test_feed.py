@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig_stream import RATE_HZ, cut, record
+from rig_stream import RATE_HZ, cut, machine, record
 
 from gearsim_dsp.results import AlarmState
+from gearsim_dsp.streams.assembler import WindowAssembler, WindowSettings
 from gearsim_dsp.streams.feed import BatchQueue, StateKeeper, StreamStatus, StreamWatch
 from gearsim_io.health import Health, Level
 
@@ -52,6 +53,30 @@ def test_queue_keeps_order_and_drops_the_oldest_beyond_its_limit():
     assert queue.seconds == pytest.approx(0.0, abs=1e-9)
     assert queue.dropped == 2 * len(SAMPLES) - len(kept)
     assert queue.dropped_samples == 512 * (len(SAMPLES) - sum(b in SAMPLES for b in kept))
+
+
+def test_queue_knows_what_is_not_analysed_yet():
+    queue = BatchQueue(limit_s=0.5)
+    for sample in SAMPLES:
+        queue.put(0.0, sample)
+    assert queue.unfinished == len(SAMPLES) - queue.dropped > 1
+    while queue.get(0.0) is not None:
+        before = queue.unfinished
+        assert before > 0  # taken, but not analysed
+        queue.finished()
+        assert queue.unfinished == before - 1
+    assert queue.unfinished == 0
+
+
+def test_what_is_not_analysed_yet_is_told(watch):
+    queue = BatchQueue(limit_s=100.0)
+    for sample in SAMPLES[:3]:
+        queue.put(0.0, sample)
+    queue.get(0.0)
+    values = watch.verdict(StreamStatus.of(None, queue)).values
+    assert values["batches not analysed yet"] == 3
+    assembler = WindowAssembler(machine(), WindowSettings())
+    assert StreamStatus.of(assembler, queue).unfinished_batches == 3
 
 
 def test_queue_hands_everything_from_one_thread_to_another_and_ends():

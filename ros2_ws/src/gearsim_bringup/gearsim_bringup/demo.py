@@ -54,10 +54,15 @@ class Demo:
         source = simulator("demo", end_after=seconds, rate=1.0, listeners=len(MONITORS) + 1)
         live = LiveRun(source, self._out / "log", bag, custom, None, teller.alarm, teller.truth)
         outcome = live.run()
+        self._warn(outcome)
         summary = self._summary(scenario, outcome, bag, seconds)
         summary["files"] = [str(bag), *self._pictures(bag, "demo")]
         self._tell_summary(summary)
         return summary
+
+    def _warn(self, outcome: Outcome) -> None:
+        if outcome.warning:
+            self._voice.say(outcome.warning)
 
     def _summary(self, scenario: Scenario, outcome: Outcome, bag: Path, seconds: float) -> dict[str, Any]:
         delivery = deliveries(bag)
@@ -125,6 +130,7 @@ class Demo:
         source = player(bag, rate=1.0, loop=False, listeners=len(MONITORS) + 1, signals_only=True)
         custom = {"source_file": path.name}
         outcome = LiveRun(source, self._out / "log", replay, custom, None, teller.alarm, teller.truth).run()
+        self._warn(outcome)
         alarms = [message for _, message in outcome.seen.alarms if message.level > 0]
         files = [str(measured), str(replay), *self._pictures(replay, "measured")]
         if not alarms:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 from gearsim_bringup.monitoring.choice import MONITORS, Choice
 from gearsim_bringup.processes import Graph, NodeProcess, NodeSpec
+from gearsim_bringup.quiet import Quiet
 from gearsim_bringup.ui import JobFailedError
 from gearsim_io import qos
 from gearsim_io.errors import InputError
@@ -22,6 +22,7 @@ _READY_S = 60.0
 # In which another rig in this domain makes itself known, as a rule. At times the middleware's first greetings
 # are lost and the next come after 3 s: so the run keeps looking.
 _DISCOVERY_S = 1.0
+_PATIENCE_S = 60.0
 
 
 @dataclass
@@ -77,8 +78,11 @@ class LiveRun:
         """
         from gearsim_bringup.nodes.watcher import Watcher
 
-        outcome = Outcome()
-        with Watcher(self.on_alarm, self.on_truth) as watcher, Graph(self.log_dir) as graph:
+        outcome, quiet = Outcome(), Quiet(self.choice.monitors)
+        with (
+            Watcher(self.on_alarm, self.on_truth, quiet.status) as watcher,
+            Graph(self.log_dir) as graph,
+        ):
             watcher.spin(_DISCOVERY_S, lambda: bool(watcher.publishers_of(qos.ACCEL)))
             if watcher.publishers_of(qos.ACCEL):
                 raise _other_rig()
@@ -88,8 +92,7 @@ class LiveRun:
             if on_start is not None:
                 on_start(graph)
             self._watch(watcher, graph, source)
-            if graph.failed() is None:
-                self._drain(watcher)
+            outcome.late = _drain(watcher, graph, quiet)
             graph.stop()
             watcher.spin(0.5)
             outcome.seen = watcher.seen
@@ -121,14 +124,6 @@ class LiveRun:
         if self.rrd is not None:
             self.rrd.unlink(missing_ok=True)
 
-    def _drain(self, watcher: Any) -> None:
-        """Give the monitors time to judge what they have received."""
-        count = -1
-        end = time.monotonic() + 10.0
-        while count != len(watcher.seen.alarms) and time.monotonic() < end:
-            count = len(watcher.seen.alarms)
-            watcher.spin(1.0)
-
     def _check(self, graph: Graph) -> None:
         failed = graph.failed()
         if failed is None:
@@ -138,6 +133,16 @@ class LiveRun:
             name, _, rest = words.partition(": ")
             raise BadNodeError(rest if name == failed.spec.name else words)
         raise JobFailedError(f"node {failed.spec.name} ended with status {failed.returncode()}: {words}")
+
+
+def _drain(watcher: Any, graph: Graph, quiet: Quiet) -> str:
+    """Wait for what the last samples lead to, be it in a second or on a busy computer in a minute.
+
+    Returns the nodes that did not come to it, in words.
+    """
+    quiet.restart()
+    watcher.spin(_PATIENCE_S, lambda: quiet.reached or quiet.stuck or graph.failed() is not None)
+    return quiet.words
 
 
 def _other_rig() -> InputError:
@@ -158,9 +163,21 @@ class BadNodeError(InputError):
 
 @dataclass
 class Outcome:
-    """What a run brought; `seen` as in `nodes.watcher`."""
+    """What a run brought; `seen` as in `nodes.watcher`.
+
+    `late` names the diagnostic nodes that had not judged all samples long after the last one, empty if all
+    had: their last alarms are missing.
+    """
 
     seen: Any = None
+    late: str = ""
+
+    @property
+    def warning(self) -> str:
+        """For people; empty where there is nothing to warn of."""
+        if not self.late:
+            return ""
+        return f"not judged to the end, so alarms may be missing: {self.late}"
 
 
 def simulator(scenario: str, *, end_after: float, rate: float | None, listeners: int) -> NodeSpec:

@@ -61,7 +61,9 @@ def _judge(bag: Path, source: NodeSpec, choice: Choice) -> None:
     place = None if first is None else cdr.position(first.data, first.type)
     if place is None:
         raise InputError(str(bag), qos.ACCEL.full_name, "nothing", "samples to diagnose")
-    teller = Teller(Voice(json_mode=False), place.sample_rate_hz)
+    voice = Voice(json_mode=False)
+    teller = Teller(voice, place.sample_rate_hz)
     with tempfile.TemporaryDirectory(prefix="gearsim_play_") as logs:
         run = LiveRun(source, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth, choice=choice)
-        run.run()
+        if warning := run.run().warning:
+            voice.say(warning)

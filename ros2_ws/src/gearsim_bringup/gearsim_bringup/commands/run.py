@@ -63,7 +63,9 @@ def command(
         tell_first_use(voice)
         voice.say("topics under /gearsim; Ctrl-C ends the run")
         try:
-            LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth, choice).run()
+            live = LiveRun(source, Path(logs), bag, custom, rrd, teller.alarm, teller.truth, choice)
+            if warning := live.run().warning:
+                voice.say(warning)
         finally:  # also after Ctrl-C, the usual end
             for path in (bag, rrd):
                 if path is not None and path.exists():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,14 +34,18 @@ class Watcher:
     ----------
     on_alarm, on_truth : callable, optional
         Called with each Alarm and each GroundTruth message as it arrives.
+    on_status : callable, optional
+        Called with name and key-values of each status on /diagnostics.
     """
 
     def __init__(
         self,
         on_alarm: Callable[[Any], None] | None = None,
         on_truth: Callable[[Any], None] | None = None,
+        on_status: Callable[[str, Mapping[str, str]], None] | None = None,
     ) -> None:
         self.seen = Seen()
+        self._on_status = on_status
         self._on_alarm = on_alarm
         self._on_truth = on_truth
 
@@ -94,3 +98,5 @@ class Watcher:
         for status in message.status:
             self.seen.values[status.name] = {pair.key: pair.value for pair in status.values}
             self.seen.levels[status.name] = (int.from_bytes(status.level, "little"), status.message)
+            if self._on_status is not None:
+                self._on_status(status.name, self.seen.values[status.name])

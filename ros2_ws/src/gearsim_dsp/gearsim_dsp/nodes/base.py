@@ -126,6 +126,7 @@ class MonitorNode(Node):
                 entry = self._queue.get(TICK_S)
                 if entry is not None:
                     self._analyse(*entry)
+                    self._queue.finished()
                 elif self._finish_by_s < float("inf"):
                     return
         except BaseException as error:

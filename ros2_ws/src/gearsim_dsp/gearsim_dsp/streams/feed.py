@@ -34,6 +34,8 @@ class BatchQueue:
         self.limit_s = limit_s
         self.dropped = 0
         self.dropped_samples = 0
+        self.unfinished = 0
+        """Batches put in and not yet reported by `finished`, but for those dropped."""
         self._items: deque[tuple[float, Item]] = deque()
         self._seconds = 0.0
         self._open = True
@@ -48,6 +50,7 @@ class BatchQueue:
         """Append a batch; never blocks."""
         with self._changed:
             self._items.append((arrival_s, batch))
+            self.unfinished += 1
             self._seconds += _seconds(batch)
             while len(self._items) > 1 and (
                 self._seconds > self.limit_s or len(self._items) > self.LIMIT_COUNT
@@ -55,6 +58,7 @@ class BatchQueue:
                 _, old = self._items.popleft()
                 self._seconds -= _seconds(old)
                 self.dropped += 1
+                self.unfinished -= 1
                 self.dropped_samples += old.sample_count if isinstance(old, SampleBatch) else 0
             self._changed.notify()
 
@@ -67,6 +71,11 @@ class BatchQueue:
             arrival_s, batch = self._items.popleft()
             self._seconds -= _seconds(batch)
             return arrival_s, batch
+
+    def finished(self) -> None:
+        """The analysis of one batch taken is over, and what came of it is told."""
+        with self._changed:
+            self.unfinished -= 1
 
     def close(self) -> None:
         """No more batches will come; those waiting can still be taken."""
@@ -93,12 +102,15 @@ class StreamStatus:
     dropped_batches: int = 0
     queued_s: float = 0.0
     last_note: str = ""
+    unfinished_batches: int = 0
 
     @classmethod
     def of(cls, assembler: WindowAssembler | None, queue: BatchQueue) -> StreamStatus:
         """The present numbers of a node's assembler and queue."""
         if assembler is None:
-            return cls(dropped_batches=queue.dropped, queued_s=queue.seconds)
+            return cls(
+                dropped_batches=queue.dropped, queued_s=queue.seconds, unfinished_batches=queue.unfinished
+            )
         counts = assembler.counts
         return cls(
             *assembler.stream_counts,
@@ -108,6 +120,7 @@ class StreamStatus:
             queue.dropped,
             queue.seconds,
             counts.last_note,
+            queue.unfinished,
         )
 
 
@@ -221,6 +234,7 @@ class StreamWatch:
             "windows without angle": status.windows_without_angle,
             "batches dropped for lack of time": status.dropped_batches,
             "signal waiting [s]": float(status.queued_s),
+            "batches not analysed yet": status.unfinished_batches,
         }
         if self.stale:
             yet = " yet" if self._last_s is None else ""
