@@ -104,6 +104,23 @@ def test_a_loop_of_a_player_tells_the_same_again_after_taking_the_alarms_back(me
     assert repr(twice[len(once) + 1 :]) == repr(once)
 
 
+def test_windows_that_are_pooled_are_analysed_alike_but_not_judged():
+    def reports(**how):
+        monitor = EnvelopeMonitor(machine(), EnvelopeSettings(size_every=0), **how)
+        return [o.report for o in outcomes(faulty().batches(512), monitor)], monitor
+
+    judged, _ = reports()
+    pooled, monitor = reports(by_window=False)
+    assert len(judged) == len(pooled) > 0
+    assert any(report.indications for report in judged)
+    for one, other in zip(judged, pooled, strict=True):
+        assert (other.features, other.spectra, other.indications) == ((), (), ())
+        assert (one.judged, one.quality, one.end_sample) == (other.judged, other.quality, other.end_sample)
+        for a, b in zip(one.results, other.results, strict=True):
+            assert [s.power.tobytes() for s in a.spectra] == [s.power.tobytes() for s in b.spectra]
+    assert not find_faults(machine(), monitor._pool).evidence
+
+
 def test_features_and_spectra_say_where_they_come_from():
     report = outcomes(faulty().batches(512))[-1].report
     assert [f.channel for f in report.features] == ["b1", "b3"]

@@ -55,8 +55,8 @@ class EnvelopeSettings:
     size_every : int
         Windows from one measurement of a spall's width to the next, where there is a finding; 0: none.
     between : bool
-        Demodulate the bands centred on the borders of the bank's, too: a resonance on a border shows better by a
-        third and more, for nearly twice the time.
+        Demodulate the bands centred on the borders of the bank's, too: a resonance on a border shows better
+        by a third and more, for nearly twice the time.
     """
 
     window: WindowSettings = field(default_factory=WindowSettings)
@@ -76,6 +76,15 @@ class EnvelopeSettings:
                 raise InputError("envelope settings", name, getattr(self, name), "0 to 1000")
 
 
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What is made known of one window."""
+
+    features: tuple[Features, ...] = ()
+    spectra: tuple[Spectrum, ...] = ()
+    indications: tuple[Indication, ...] = ()
+
+
 class EnvelopeMonitor(WindowedMonitor):
     """Judges each window of a stream by the squared envelope spectra of all channels.
 
@@ -88,6 +97,9 @@ class EnvelopeMonitor(WindowedMonitor):
         Name in what is published.
     speeds : WindowSpeeds, optional
         Where the windows' speeds come from, if not from their own angle signals and vibration.
+    by_window : bool
+        False for those who pool the windows' results and judge them together: no window is then judged by
+        itself, and reports have results and quality alone.
 
     Raises
     ------
@@ -101,6 +113,8 @@ class EnvelopeMonitor(WindowedMonitor):
         settings: EnvelopeSettings | None = None,
         source: str = "envelope",
         speeds: WindowSpeeds | None = None,
+        *,
+        by_window: bool = True,
     ) -> None:
         self.settings = settings or EnvelopeSettings()
         super().__init__(machine, self.settings.window, source)
@@ -112,6 +126,7 @@ class EnvelopeMonitor(WindowedMonitor):
         find_faults(machine, self._pool)  # an impossible nameplate is told now, not at the first window
         self._families = fault_families(machine)
         self._speeds = speeds or LiveSpeeds(machine)
+        self._by_window = by_window
         self._sizes = LiveSizes(machine, self.settings.size_every)
 
     def _restart(self) -> None:
@@ -127,19 +142,29 @@ class EnvelopeMonitor(WindowedMonitor):
         quality = tuple(issue for result in results for issue in result.quality) + self._speeds.issues
         if self._speeds.lost:
             results = []  # on no known axis
-        self._pool.add(results)
-        verdict = find_faults(self.machine, self._pool)
-        judged = any(result.spectra for result in results)
+        fit = [result for result in results if result.spectra]
+        told = self._told(window, results, fit, speed) if self._by_window else _Told()
         return self._report(
             window,
-            features=(self._of_result(window, result, verdict) for result in results if result.spectra),
-            spectra=(self._spectrum(window, result, verdict) for result in results if result.spectra),
-            indications=indications(verdict, self._widths(window, verdict, speed)) if judged else (),
+            features=told.features,
+            spectra=told.spectra,
+            indications=told.indications,
             tests=1,
-            judged=judged,
+            judged=bool(fit),
             note=self._why_not(quality, speed),
             quality=quality,
             results=results,
+        )
+
+    def _told(
+        self, window: Window, results: list[WindowResult], fit: list[WindowResult], speed: ShaftSpeed
+    ) -> _Told:
+        self._pool.add(results)
+        verdict = find_faults(self.machine, self._pool)
+        return _Told(
+            tuple(self._of_result(window, result, verdict) for result in fit),
+            tuple(self._spectrum(window, result, verdict) for result in fit),
+            indications(verdict, self._widths(window, verdict, speed)) if fit else (),
         )
 
     def _analyse(self, window: Window, row: int, speed: ShaftSpeed) -> WindowResult:
