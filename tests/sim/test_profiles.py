@@ -389,6 +389,11 @@ def test_profiles_of_a_scenario(tmp_path):
     course = built({"trace": given}, speed=None, folder=tmp_path)
     assert course.speed_at(seconds(4.0)) == pytest.approx(10.8, abs=1e-9)
     assert course.load_at(seconds(4.0)) == pytest.approx(44.0, abs=1e-9)
+    columns = {"t": range(9), "n": [600 + 12 * t for t in range(9)], "load": [40 + t for t in range(9)]}
+    written = {"columns": columns, "time": "t", "speed": "n", "speed_unit": "rpm", "load": "load"}
+    same = built({"trace": written}, speed=None)
+    assert same.speed_at(seconds(3.3)) == course.speed_at(seconds(3.3))
+    assert same.load_at(seconds(3.3)) == course.load_at(seconds(3.3))
     course = built({"load_noise": {"rms": "2 N*m", "high": "20 Hz"}})
     assert np.any(course.segment(5).fluctuation)
     assert course.segment(5).motor[0] == 25.0
@@ -410,6 +415,13 @@ def test_profiles_of_a_scenario(tmp_path):
         ({}, {"speed": 31.0}, "0 to 30 Hz"),
         ({}, {"speed": None}, "a speed, or a profile.trace"),
         ({"trace": {"file": "t.csv"}}, {}, "no speed beside"),
+        ({"trace": {}}, {"speed": None}, "either a file or columns"),
+        ({"trace": {"columns": {"time_s": [0, 1]}}}, {"speed": None}, "speed_hz: got nothing.*time_s"),
+        (
+            {"trace": {"columns": {"time_s": [0, 1, 2, 3], "speed_hz": [9, 9, 9]}}},
+            {"speed": None},
+            "speed_hz: got 3 values, expected 4",
+        ),
         ({"load_law": {"linear": 0.5}}, {}, "add up to 1"),
         ({"load_noise": {"rms": "60 N*m", "high": "20 Hz"}}, {}, "at most 50 N m"),
         ({"load_noise": {"rms": "6 N*m", "low": "30 Hz", "high": "20 Hz"}}, {}, "low below high"),

@@ -108,7 +108,7 @@ class Operation:
         if trace is None:
             assert given is not None
             return given
-        return float(read_trace(trace, self.folder)[0].values[0])
+        return float(read_trace(trace, self.folder, self.where)[0].values[0])
 
     def first_load_nm(self, given: float | None) -> float:
         """The load at the start: as given, or that of the measured trace.
@@ -121,7 +121,7 @@ class Operation:
         if given is not None:
             return given
         trace = self.profile.trace
-        load = None if trace is None else read_trace(trace, self.folder)[1]
+        load = None if trace is None else read_trace(trace, self.folder, self.where)[1]
         if load is None:
             expected = "a load, or else a load column in profile.trace"
             raise InputError(self.where, "operating_point.load", "nothing", expected)

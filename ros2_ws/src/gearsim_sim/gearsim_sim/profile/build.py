@@ -16,7 +16,7 @@ from gearsim_sim.profile.laws import CREEP, ConstantMotor, ControlledMotor, Curv
 from gearsim_sim.profile.noise import WIDEST_BAND, RandomLoad
 from gearsim_sim.profile.profile import Profile
 from gearsim_sim.profile.settings import LoadLawModel, LoadNoiseModel, ProfileModel, TorquesModel, TraceModel
-from gearsim_sim.profile.trace import Trace, read_columns, trace_curve
+from gearsim_sim.profile.trace import Trace, chosen_columns, read_columns, trace_curve
 
 # The torques must bring the machine this near to the speed that is asked for.
 _REACHED = 0.98
@@ -89,7 +89,7 @@ def _prescribed(wanted: Wanted, drive: DriveLimits) -> tuple[Curve, Curve]:
 
 
 def _of_trace(wanted: Wanted, given: TraceModel, drive: DriveLimits) -> tuple[Curve, Curve]:
-    trace, loads = read_trace(given, wanted.folder)
+    trace, loads = read_trace(given, wanted.folder, wanted.where)
     speed = trace_curve(trace, drive.step_s, given.tolerance, given.speed)
     _check_trace(trace.where, given.speed, speed, drive)
     if given.load is None or loads is None:
@@ -101,23 +101,36 @@ def _of_trace(wanted: Wanted, given: TraceModel, drive: DriveLimits) -> tuple[Cu
     return speed, load
 
 
-def read_trace(given: TraceModel, folder: Path) -> tuple[Trace, Trace | None]:
-    """Speed [Hz] and, if there is one, load [N m] of a measured trace; paths start at `folder`.
+def read_trace(given: TraceModel, folder: Path, where: str) -> tuple[Trace, Trace | None]:
+    """Speed [Hz] and, if there is one, load [N m] of a measured trace.
+
+    Parameters
+    ----------
+    given : TraceModel
+    folder : Path
+        Where the path of its file starts.
+    where : str
+        The scenario, for mistakes in columns that it holds itself.
 
     Raises
     ------
     InputError
-        If the file cannot be read or followed.
+        If the file or the columns cannot be read or followed.
     """
-    path = Path(given.file) if Path(given.file).is_absolute() else folder / given.file
     names = (given.time, given.speed) if given.load is None else (given.time, given.speed, given.load)
-    columns = read_columns(path, names)
+    if given.columns is not None:
+        place = f"{where}: profile.trace.columns"
+        columns = chosen_columns(place, given.columns, names)
+    else:
+        path = folder / (given.file or "")
+        place = str(path)
+        columns = read_columns(path, names)
     unit = _RPM if given.speed_unit == "rpm" else 1.0
-    speed = Trace(str(path), columns[given.time], columns[given.speed] * unit)
+    speed = Trace(place, columns[given.time], columns[given.speed] * unit)
     speed.checked(given.speed, given.max_gap)
     if given.load is None:
         return speed, None
-    load = Trace(str(path), columns[given.time], columns[given.load])
+    load = Trace(place, columns[given.time], columns[given.load])
     return speed, load.checked(given.load, given.max_gap)
 
 

@@ -15,10 +15,12 @@ SpeedHz = Annotated[float, Si("Hz", ge=0, le=500)]
 
 
 class TraceModel(Strict):
-    """A measured speed (and load) over time: columns of a CSV file, or arrays of an npz file."""
+    """A measured speed (and load) over time: columns of a CSV file, arrays of an npz file, or written out."""
 
-    file: str = Field(min_length=1)
+    file: Annotated[str, Field(min_length=1)] | None = None
     """CSV file with a header, or npz file, beside the scenario."""
+    columns: dict[str, tuple[float, ...]] | None = None
+    """The columns themselves, in place of a file: `{time_s: [0, 1, 2, 3], speed_hz: [9, 10, 10, 9]}`."""
     time: str = "time_s"
     """Column of the time in seconds, from 0 on."""
     speed: str = "speed_hz"
@@ -33,6 +35,12 @@ class TraceModel(Strict):
     """The same for the load."""
     max_gap: Seconds | None = None
     """Longest time without a point; without it ten times the usual interval."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> TraceModel:
+        if (self.file is None) == (self.columns is None):
+            raise ValueError("either a file or columns")
+        return self
 
 
 class CurvePointModel(Strict):

@@ -8,6 +8,7 @@ no kink. With a tolerance it is the smoothest such spline whose rms distance fro
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -210,10 +211,29 @@ def read_columns(path: Path, names: tuple[str, ...]) -> dict[str, Array]:
         found = _read_npz(path) if path.suffix == ".npz" else _read_csv(path)
     except (OSError, ValueError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(str(path), "", error, "a .csv file with a header, or an .npz file") from None
+    return chosen_columns(str(path), found, names)
+
+
+def chosen_columns(
+    where: str, found: Mapping[str, Array | Sequence[float]], names: tuple[str, ...]
+) -> dict[str, Array]:
+    """The columns of these names, all of one length.
+
+    Raises
+    ------
+    InputError
+        If one is missing, or their lengths differ.
+    """
     for name in names:
         if name not in found:
-            raise InputError(str(path), name, "nothing", "this column; there are " + ", ".join(found))
-    return {name: found[name] for name in names}
+            raise InputError(where, name, "nothing", "this column; there are " + ", ".join(found))
+    columns = {name: np.asarray(found[name], dtype=np.float64) for name in names}
+    first, *others = columns
+    for name in others:
+        if columns[name].size != columns[first].size:
+            expected = f"{columns[first].size} values, as {first} has"
+            raise InputError(where, name, f"{columns[name].size} values", expected)
+    return columns
 
 
 def _read_npz(path: Path) -> dict[str, Array]:
