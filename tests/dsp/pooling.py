@@ -13,7 +13,13 @@ from gearsim_io.record import PulseTrain
 
 
 def pool_of(
-    data: np.ndarray, rate_hz: float, plate: Machine, tacho: np.ndarray | None = None, window_s: float = 2.0
+    data: np.ndarray,
+    rate_hz: float,
+    plate: Machine,
+    tacho: np.ndarray | None = None,
+    window_s: float = 2.0,
+    *,
+    between: bool = False,
 ) -> EvidencePool:
     """`data` has shape (channels, samples); windows overlap by half."""
     pool = EvidencePool(plate)
@@ -27,7 +33,15 @@ def pool_of(
         pool.add(
             [
                 analyse_window(
-                    WindowInput(row[start : start + length], rate_hz, channel.name, start, speed, plate)
+                    WindowInput(
+                        row[start : start + length],
+                        rate_hz,
+                        channel.name,
+                        start,
+                        speed,
+                        plate,
+                        between=between,
+                    )
                 )
                 for channel, row in zip(plate.channels, data, strict=True)
             ]

@@ -76,7 +76,7 @@ def test_faulty_records(record_file, name, machine, component, fault):
     assert not diagnosis.healthy
     assert diagnosis.speed.source in ("estimated", "nameplate")
     (finding,) = diagnosis.findings
-    assert finding.confidence > 0.5
+    assert finding.confidence > 0.7
     family = next(f for f in fault_families(plate) if f.fault == fault)
     nominal = float(record.notes.get("speed_hz", plate.nominal_speed_hz))
     line = zoomed_line(record.data[0].astype(np.float64), record.sample_rate_hz, family.order * nominal)

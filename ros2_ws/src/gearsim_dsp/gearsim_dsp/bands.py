@@ -27,7 +27,10 @@ _CLEAR_OF = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A frequency band in Hz, 0 < low < high; `why` tells who chose it, such as "kurtogram" or "bank"."""
+    """A frequency band in Hz, 0 < low < high.
+
+    `why` tells who chose it: "bank" and "between" (`BandPlan`), "kurtogram", "given".
+    """
 
     low_hz: float
     high_hz: float
@@ -36,9 +39,14 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class BandPlan:
-    """The bank of bands (all `width_hz` wide) and the order axis of their envelope spectra."""
+    """The bank of bands (all `width_hz` wide) and the order axis of their envelope spectra.
+
+    `bank` covers the spectrum side by side. A resonance at a border is cut in two; the bands of `between` are
+    centred on the borders.
+    """
 
     bank: tuple[Band, ...]
+    between: tuple[Band, ...]
     width_hz: float
     top_order: float
     order_step: float
@@ -95,9 +103,12 @@ def plan_bands(
     count = min(_MAX_BANDS, max(1, int((ceiling - floor) / good_width)))
     width = (ceiling - floor) / count
     bank = tuple(Band(floor + k * width, floor + (k + 1) * width, "bank") for k in range(count))
+    between = tuple(
+        Band(floor + (k + 0.5) * width, floor + (k + 1.5) * width, "between") for k in range(count - 1)
+    )
     top = min(_HARMONICS * max(f.order for f in families), 0.8 * width / plan_hz)
     order_step = 0.5 / sfft.next_fast_len(math.ceil(samples / sample_rate_hz * plan_hz), real=True)
-    return BandPlan(bank, width, top, order_step, floor, ceiling, least_width), []
+    return BandPlan(bank, between, width, top, order_step, floor, ceiling, least_width), []
 
 
 def _plan_speed(speed_hz: float, nominal_hz: float) -> float:

@@ -53,7 +53,8 @@ class DiagnosisSettings:
         Length of a window; it is made longer where the shaft needs that for `least_turns`, and shorter where
         the record is.
     least_turns : float
-        Turns of the reference shaft in a window.
+        Turns in a window of the slowest shaft that has bearings: its harmonics must be parted from their
+        lines.
     batch_samples : int
         Size of the batches handed to the monitors; it has no influence on the result.
     """
@@ -175,7 +176,8 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
     if angle.replaces_angle and angle.speed is not None:
         speeds = KnownSpeeds(angle.speed, record.first_sample)
-    envelope = EnvelopeMonitor(plate, EnvelopeSettings(window, size_every=0), speeds=speeds)
+    settled = EnvelopeSettings(window, size_every=0, between=True)
+    envelope = EnvelopeMonitor(plate, settled, speeds=speeds, by_window=False)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
     pool = EvidencePool(plate)
     reports: list[Report] = []
@@ -237,7 +239,8 @@ def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> Wi
     """Windows of the length asked for, at most the record's, overlapping by three quarters."""
     length = settings.window_s
     if np.isfinite(machine.nominal_speed_hz):
-        length = max(length, settings.least_turns / machine.nominal_speed_hz)
+        slowest = min((machine.shaft(one.shaft).ratio for one in machine.bearings), default=1.0)
+        length = max(length, settings.least_turns / (slowest * machine.nominal_speed_hz))
     length = float(np.clip(length, 0.05, 60.0))
     if record.seconds < length:
         length = max(0.05, np.floor(record.sample_count * 0.999) / record.sample_rate_hz)

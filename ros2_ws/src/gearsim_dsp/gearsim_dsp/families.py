@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,14 @@ from gearsim_dsp.comb import CombGrid, comb_grid, score_combs
 from gearsim_dsp.evidence import ChannelSpectra
 from gearsim_dsp.kinematics import FaultFamily
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
+from gearsim_dsp.shaft_lines import (
+    ShaftMultiple,
+    SpectrumView,
+    covering_multiple,
+    other_shafts,
+    over_shaft,
+    strongest_other_multiple,
+)
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_io.nameplate import Machine
 
@@ -22,6 +31,7 @@ _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _MOST_DOMINANCE = 1000.0
 _CLEAR = 12.0
+_SURE, _DOMINANT = 1e-4, 1.6
 # Powers of a band over that of the channel, and over that of the loudest channel, below which it holds only
 # leakage and rounding: sensors and converters do not reach so far down.
 _LEAST_OF_OWN, _LEAST_OF_ALL = 1e-7, 1e-8
@@ -71,6 +81,8 @@ class FamilyEvidence:
         The same band by band, to compare channels.
     windows : int
         Windows averaged.
+    covered_by : ShaftMultiple or None
+        The shaft's lines that the family's own cannot be told from; its other lines are then the floor.
     """
 
     family: FaultFamily
@@ -86,6 +98,7 @@ class FamilyEvidence:
     dominance: float
     by_band: tuple[BandLevel, ...]
     windows: int
+    covered_by: ShaftMultiple | None = None
 
 
 class FamilySearch:
@@ -121,30 +134,37 @@ class FamilySearch:
         least = max(_LEAST_OF_OWN * spectra.whole, _LEAST_OF_ALL * loudest)
         self._filled = spectra.level > least
         floor = local_floor(spectra.power, _BLOCK_LINES, spectra.averages, _SKIP_LINES)
-        self._excess = spectra.power - floor
-        self._ratio, self._tail = self._with_mean(spectra.power / floor)
-        self._usable = self._free_of_shafts(machine)
+        self._machine = machine
+        turns = [shaft.ratio for shaft in machine.shafts]
+        ratio, tail = self._with_mean(spectra.power / floor)
+        self._view = SpectrumView(ratio, tail, spectra.power - floor, self._free_of(turns))
+        self._over_shafts: dict[ShaftMultiple, SpectrumView] = {}
+        self._explained = np.zeros(spectra.power.shape[1], dtype=np.bool_)
 
     def _with_mean(self, ratio: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Rows of the bands and, when there are several, one for their mean: weak lines are in many bands."""
+        """Rows of the bands and, when there are several side by side, one for the mean of these.
+
+        Weak lines are in many bands.
+        """
         averages = self._spectra.averages
         worth = 0.45 * _BLOCK_LINES / 2
         tail = LineTail(averages, averages * worth)(ratio)
-        bands = ratio.shape[0]
+        independent = np.array([band.why != "between" for band in self._spectra.bands])
+        bands = int(np.count_nonzero(independent))
         if bands < 2:
             return ratio, tail
-        mean = np.asarray(ratio.mean(axis=0, keepdims=True), dtype=np.float64)
+        mean = np.asarray(ratio[independent].mean(axis=0, keepdims=True), dtype=np.float64)
         mean /= local_floor(mean, _BLOCK_LINES, averages * bands, _SKIP_LINES)
         mean_tail = LineTail(averages * bands, averages * bands * worth)(mean)
         return np.vstack([ratio, mean]), np.vstack([tail, mean_tail])
 
-    def _free_of_shafts(self, machine: Machine) -> NDArray[np.bool_]:
+    def _free_of(self, shaft_orders: Iterable[float]) -> NDArray[np.bool_]:
         """False at harmonics of the shafts; gear meshes with their sidebands are among these."""
         order = self._axis()
         usable = order > 0.0
         usable[:_SKIP_LINES] = False
-        for shaft in machine.shafts:
-            turn = shaft.ratio * self._scale
+        for shaft_order in shaft_orders:
+            turn = shaft_order * self._scale
             number = np.round(order / turn)
             width = _LINE_HALF_WIDTH * self._resolution + self._doubt * order
             usable &= np.abs(order - number * turn) > np.minimum(width, 0.25 * turn)
@@ -155,17 +175,25 @@ class FamilySearch:
         return np.asarray(lines * self._spectra.order_step)
 
     def judge(self, family: FaultFamily) -> FamilyEvidence:
-        """Evidence of a family on this channel."""
+        """Evidence of a family on this channel; where a shaft covers it, the better of two ways to look."""
+        plain = self._judged(family, None)
+        multiple = covering_multiple(self._machine, family, self._resolution / self._scale, self._doubt)
+        if multiple is None:
+            return plain
+        return max(plain, self._judged(family, multiple), key=_weight)
+
+    def _judged(self, family: FaultFamily, multiple: ShaftMultiple | None) -> FamilyEvidence:
         half_width = family.tolerance + self._doubt
         grid = self._grid(family, family.order * self._scale, half_width)
-        scores = score_combs(self._tail, self._usable, grid)
-        row, best = self._peak(grid, scores.score)
+        view = self._view_of(multiple)
+        scores = score_combs(view.tail, view.usable, grid)
+        row, best = self._peak(view, grid, scores.score)
         trials = scores.score.shape[0] * self._independent_orders(family, half_width)
         p = search_false_alarm(min(1.0, float(np.exp(-scores.score[row].max()))), trials * self._looks)
-        modulation = self._modulation(grid, best)
+        modulation = self._modulation(view, grid, best)
         band = self._band(scores.score[:, best], modulation, trials)
-        found = self._refined(grid, best, row)
-        harmonics, sidebands = self._snr_db(grid, best, band)
+        found = self._refined(view, grid, best, row)
+        harmonics, sidebands = self._snr_db(view, grid, best, band)
         spectra = self._spectra
         return FamilyEvidence(
             family=family,
@@ -178,23 +206,72 @@ class FamilySearch:
             snr_db=max(harmonics[:4], default=float("nan")),
             false_alarm_probability=p,
             modulation=float(modulation[band]) if self._filled[band] else 0.0,
-            dominance=self._dominance(family, found, band, float(modulation[band])) if p < 0.01 else 0.0,
+            dominance=self._over_others(view, family, found, band, float(modulation[band]), multiple)
+            if p < 0.01
+            else 0.0,
             by_band=self._by_band(scores.score[:, best] - np.log(trials), modulation),
             windows=spectra.windows,
+            covered_by=multiple,
         )
+
+    def _over_others(
+        self,
+        view: SpectrumView,
+        family: FaultFamily,
+        found: float,
+        band: int,
+        modulation: float,
+        multiple: ShaftMultiple | None,
+    ) -> float:
+        dominance = self._dominance(view, family, found, band, modulation)
+        if multiple is None:
+            return dominance
+        return min(dominance, self._dominance_on_shaft(multiple, band, modulation))
+
+    def _view_of(self, multiple: ShaftMultiple | None) -> SpectrumView:
+        """The spectra as a family is judged on them, without lines that are explained already."""
+        view = self._view
+        if multiple is not None:
+            if multiple not in self._over_shafts:
+                self._over_shafts[multiple] = over_shaft(
+                    view,
+                    self._spectra.power,
+                    self._spectra.order_step,
+                    self._lines_wide,
+                    multiple.shaft_order * self._scale,
+                    multiple.number,
+                    self._free_of(other_shafts(self._machine, multiple, self._resolution / self._scale)),
+                )
+            view = self._over_shafts[multiple]
+        return replace(view, usable=view.usable & ~self._explained)
+
+    @property
+    def _lines_wide(self) -> int:
+        return max(1, round(_LINE_HALF_WIDTH * self._resolution / self._spectra.order_step))
+
+    def _dominance_on_shaft(self, multiple: ShaftMultiple, band: int, modulation: float) -> float:
+        """The modulation over that of the shaft's strongest other multiple nearby."""
+        rival = strongest_other_multiple(
+            self._view.excess[band],
+            self._spectra.order_step,
+            self._lines_wide,
+            multiple.shaft_order * self._scale,
+            multiple.number,
+        )
+        return min(modulation / max(rival, 1e-12), _MOST_DOMINANCE)
 
     def _grid(self, family: FaultFamily, order: float, half_width: float) -> CombGrid:
         lines = self._spectra.power.shape[1]
         sideband = family.sideband_order * self._scale
         return comb_grid(order, half_width, self._spectra.order_step, lines, sideband, self._resolution)
 
-    def _peak(self, grid: CombGrid, score: NDArray[np.float64]) -> tuple[int, int]:
+    def _peak(self, view: SpectrumView, grid: CombGrid, score: NDArray[np.float64]) -> tuple[int, int]:
         """Row and candidate of the best comb; of candidates about as improbable, that on the lines' tops."""
         row = int(np.argmax(score.max(axis=1)))
         near = score[row] >= _PLATEAU * score[row].max()
         index = grid.harmonics[:, :_TOP_HARMONICS]
-        on = (index >= 0) & self._usable[index]
-        height = np.log(np.maximum(self._ratio[row, index], 1e-3)) * on
+        on = (index >= 0) & view.usable[index]
+        height = np.log(np.maximum(view.ratio[row, index], 1e-3)) * on
         # The mean, not the sum: a candidate must not lose because one of its lines falls on the shaft's.
         mean = height.sum(axis=1) / np.maximum(on.sum(axis=1), 1)
         return row, int(np.argmax(np.where(near & (on.sum(axis=1) >= 2), mean, -np.inf)))
@@ -202,14 +279,14 @@ class FamilySearch:
     def _independent_orders(self, family: FaultFamily, half_width: float) -> float:
         return 1.0 + _CELL_SHARE * 2 * half_width * family.order * 8 / self._resolution
 
-    def _modulation(self, grid: CombGrid, at: int) -> NDArray[np.float64]:
+    def _modulation(self, view: SpectrumView, grid: CombGrid, at: int) -> NDArray[np.float64]:
         """Mean square of a comb's lines, per band: a line of power m^2 / 4 is a cosine of mean square m^2 /
         2.
         """
         index = np.concatenate([grid.harmonics[at], grid.sidebands[at].ravel()])
         index = np.unique(index[(index >= 0)])
-        index = index[self._usable[index]]
-        return np.asarray(2.0 * np.maximum(self._excess[:, index], 0.0).sum(axis=1))
+        index = index[view.usable[index]]
+        return np.asarray(2.0 * np.maximum(view.excess[:, index], 0.0).sum(axis=1))
 
     def _by_band(self, score: NDArray[np.float64], modulation: NDArray[np.float64]) -> tuple[BandLevel, ...]:
         amplitude = self._spectra.level * np.sqrt(2 * modulation)
@@ -224,16 +301,16 @@ class FamilySearch:
             return int(np.argmax(np.where(self._filled, score[:bands], -1.0)))
         return int(np.argmax(np.where(clear, modulation, -1.0)))
 
-    def _refined(self, grid: CombGrid, at: int, row: int) -> float:
+    def _refined(self, view: SpectrumView, grid: CombGrid, at: int, row: int) -> float:
         """Fundamental on the axis from the interpolated peaks of the strongest harmonics.
 
         Slip widens a line as the square of its number, so harmonics that have lost more than 6 dB against the
         strongest say little; those left weigh by the square of their number and by their power.
         """
-        spectrum = self._ratio[row]
+        spectrum = view.ratio[row]
         peaks = []
         for number, index in enumerate(grid.harmonics[at], start=1):
-            if not 2 <= index < spectrum.size - 2 or not self._usable[index]:
+            if not 2 <= index < spectrum.size - 2 or not view.usable[index]:
                 continue
             window = spectrum[index - 2 : index + 3]
             peak = int(np.argmax(window))
@@ -249,8 +326,10 @@ class FamilySearch:
         weight = table[:, 0] ** 2 * table[:, 2] * (table[:, 2] >= _REFINE_SHARE * table[:, 2].max())
         return float(np.sum(weight * table[:, 1]) / np.sum(weight))
 
-    def _snr_db(self, grid: CombGrid, at: int, band: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        ratio = self._ratio[band]
+    def _snr_db(
+        self, view: SpectrumView, grid: CombGrid, at: int, band: int
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        ratio = view.ratio[band]
         harmonics = [self._db(ratio, i) for i in grid.harmonics[at] if i >= 0]
         pairs = [[self._db(ratio, i) for i in pair if i >= 0] for pair in grid.sidebands[at]]
         return tuple(harmonics), tuple(max(pair) for pair in pairs if pair)
@@ -259,23 +338,25 @@ class FamilySearch:
     def _db(ratio: NDArray[np.float64], index: np.intp) -> float:
         return float(10 * np.log10(max(float(ratio[index]), 1e-3)))
 
-    def _dominance(self, family: FaultFamily, found: float, band: int, modulation: float) -> float:
+    def _dominance(
+        self, view: SpectrumView, family: FaultFamily, found: float, band: int, modulation: float
+    ) -> float:
         """The family's modulation over that of the strongest comb made of lines it does not explain.
 
         Combs between 0.5 and 2 times the order, all with eight harmonics.
         """
-        unexplained = self._usable & ~self._lines_of(family, found)
+        unexplained = view.usable & ~self._lines_of(family, found)
         candidates = np.arange(0.5 * found, 2.0 * found, self._resolution / 16)
         index = np.round(candidates[:, None] * np.arange(1, 9) / self._spectra.order_step).astype(np.intp)
-        inside = index < self._excess.shape[1]
+        inside = index < view.excess.shape[1]
         index = np.where(inside, index, 0)
-        power = np.maximum(self._excess[band, index], 0.0) * (inside & unexplained[index])
+        power = np.maximum(view.excess[band, index], 0.0) * (inside & unexplained[index])
         rival = float(np.max(2.0 * power.sum(axis=1), initial=0.0))
         return min(modulation / max(rival, 1e-12), _MOST_DOMINANCE)
 
     def explain(self, family: FaultFamily, found_order: float) -> None:
         """Take the lines of a family that was found out of the search for others."""
-        self._usable &= ~self._lines_of(family, found_order * self._scale)
+        self._explained |= self._lines_of(family, found_order * self._scale)
 
     def _lines_of(self, family: FaultFamily, found: float) -> NDArray[np.bool_]:
         """Harmonics of the fundamental, with sidebands of the shaft's and of the family's own spacing."""
@@ -292,3 +373,11 @@ class FamilySearch:
             number = np.maximum(1.0, np.round((order - shift) / found))
             lines |= np.abs(order - shift - number * found) < width
         return lines
+
+
+def _weight(evidence: FamilyEvidence) -> tuple[bool, float]:
+    """What is improbable counts first, then size, as far as it is dominant."""
+    p = evidence.false_alarm_probability
+    if p >= _SURE:
+        return False, -p
+    return True, evidence.modulation * min(evidence.dominance, _DOMINANT)

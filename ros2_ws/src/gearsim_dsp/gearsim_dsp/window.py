@@ -50,6 +50,8 @@ class WindowInput:
         The nameplate.
     bands : tuple of Band
         Bands to demodulate beside the bank of `bands.plan_bands`, such as one given or the kurtogram's.
+    between : bool
+        Demodulate the bands centred on the borders of the bank's, too.
     """
 
     samples: NDArray[np.float32] | NDArray[np.float64]
@@ -59,6 +61,7 @@ class WindowInput:
     speed: ShaftSpeed
     machine: Machine
     bands: tuple[Band, ...] = ()
+    between: bool = False
 
     def __post_init__(self) -> None:
         where = f"channel {self.channel!r}"
@@ -183,7 +186,7 @@ def _spectra(
 ) -> tuple[tuple[BandSpectrum, ...], float]:
     clean = suppress_lines(spectrum)
     phase = window.speed.phase or _steady_phase(window)
-    bands = list(plan.bank)
+    bands = [*plan.bank, *(plan.between if window.between else ())]
     envelopes = [squared_envelopes(clean, np.array([b.low_hz for b in bands]), plan.width_hz)]
     for extra in window.bands:
         fitted = plan.fit(extra)

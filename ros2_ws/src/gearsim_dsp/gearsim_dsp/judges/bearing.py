@@ -23,6 +23,7 @@ import numpy as np
 from gearsim_dsp.bands import Band
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.families import FamilyEvidence, FamilySearch
+from gearsim_dsp.judges.companions import accompanies, is_companion
 from gearsim_dsp.judges.confidence import confidence
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import FaultFamily, fault_families
@@ -44,10 +45,7 @@ MODULATION_LIMIT = 0.12
 DOMINANCE_LIMIT = 1.6
 _MOST_FINDINGS = 4
 _CAGE_FUNDAMENTAL_DB = 10.0
-_CAGES_ALIKE = 0.06
 _SAME_COMB = 3e-3
-_SECOND_DOMINANCE = 3.0
-_SECOND_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,19 +97,20 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
     searches = [FamilySearch(machine, spectra, speed, looks, loudest) for spectra in channels]
     latest = {id(group): _judge(group, searches) for group in groups}
     by_channel = tuple(evidence for group in groups for evidence in latest[id(group)])
+    resolution = max(1.0 / spectra.turns for spectra in channels)
     findings: list[Finding] = []
     open_groups = list(groups)
     while open_groups and len(findings) < _MOST_FINDINGS:
-        good = [g for g in open_groups if _stands(machine, g, latest[id(g)], findings)]
+        good = [g for g in open_groups if _stands(machine, g, latest[id(g)], findings, resolution)]
         if not good:
             break
         best = max(good, key=lambda g: _best(latest[id(g)]).modulation)
         alike = [g for g in good if _same_lines(_best(latest[id(g)]), _best(latest[id(best)]))]
         best = max(alike, key=lambda g: _near(machine, g, latest[id(g)]))
-        findings.append(_finding(machine, best, latest[id(best)], speed))
+        findings.append(_finding(machine, best, latest[id(best)], speed, findings))
         open_groups.remove(best)
         open_groups = [
-            g for g in open_groups if g not in alike and not _accompanies(machine, g, findings[-1])
+            g for g in open_groups if g not in alike and not accompanies(machine, g.first, findings[-1])
         ]
         for search in searches:
             search.explain(best.first, _best(latest[id(best)]).found_order)
@@ -121,24 +120,19 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
     return Verdict(tuple(findings), evidence, tuple(_notes(open_groups, latest)), speed, by_channel)
 
 
-def _stands(machine: Machine, group: _Group, judged: list[FamilyEvidence], findings: list[Finding]) -> bool:
-    """True for a fault that is no companion of one found before.
-
-    On one bearing BPFO + BPFI = N turns: a fault of one race whose amplitude swings with the shaft has
-    sidebands next to the other's lines. A second fault of a bearing must be clearer than a first.
-    """
-    evidence = _best(judged)
-    if not is_fault(evidence):
+def _stands(
+    machine: Machine,
+    group: _Group,
+    judged: list[FamilyEvidence],
+    findings: list[Finding],
+    resolution: float,
+) -> bool:
+    """True for a fault that is no companion of one found before."""
+    best = _best(judged)
+    if not is_fault(best):
         return False
     component = _component(machine, group, judged)[0].component
-    for finding in findings:
-        first = finding.evidence["modulation"]
-        assert isinstance(first, float)
-        if finding.component == component and (
-            evidence.dominance < _SECOND_DOMINANCE or evidence.modulation < _SECOND_SHARE * first
-        ):
-            return False
-    return True
+    return not any(is_companion(machine, component, judged, best, one, resolution) for one in findings)
 
 
 def _same_lines(one: FamilyEvidence, other: FamilyEvidence) -> bool:
@@ -162,19 +156,6 @@ def _near(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> floa
         near = max((level for name, level in levels.items() if name in own), default=0.0)
         ratios.append(math.log(max(near, 1e-3 * max(levels.values())) / max(levels.values())))
     return float(np.mean(ratios)) if ratios else -math.inf
-
-
-def _accompanies(machine: Machine, group: _Group, finding: Finding) -> bool:
-    """A damaged race is struck harder by some elements than by others, so lines of its cage come with it.
-
-    Cages of other bearings on the shaft turn at nearly the same speed, and cannot be told from it.
-    """
-    if group.first.fault != "cage":
-        return False
-    cages = [
-        f.order for f in fault_families(machine) if f.fault == "cage" and f.component == finding.component
-    ]
-    return any(abs(group.first.order / order - 1.0) < _CAGES_ALIKE for order in cages)
 
 
 def _groups(machine: Machine) -> list[_Group]:
@@ -209,7 +190,13 @@ def is_fault(evidence: FamilyEvidence) -> bool:
     )
 
 
-def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], speed: ShaftSpeed) -> Finding:
+def _finding(
+    machine: Machine,
+    group: _Group,
+    judged: list[FamilyEvidence],
+    speed: ShaftSpeed,
+    before: list[Finding],
+) -> Finding:
     evidence = _best(judged)
     family, shares = _component(machine, group, judged)
     features = {
@@ -218,6 +205,7 @@ def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], spee
         "share": _share_of_two(shares, family.component),
         "improbable": min(-math.log10(max(evidence.false_alarm_probability, 1e-30)), 30.0) / 10.0,
         "harmonics": float(sum(level >= 6.0 for level in evidence.harmonic_snr_db)) / 4.0,
+        "beside": _beside(evidence, before),
     }
     details: dict[str, object] = {
         "channel": evidence.channel,
@@ -235,6 +223,8 @@ def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], spee
     }
     if shares:
         details["component_shares"] = shares
+    if evidence.covered_by is not None:
+        details["covered_by"] = f"{evidence.covered_by.number} x {evidence.covered_by.shaft}"
     return Finding(
         family.component,
         family.fault,
@@ -247,6 +237,16 @@ def _finding(machine: Machine, group: _Group, judged: list[FamilyEvidence], spee
         evidence.channel,
         details,
     )
+
+
+def _beside(evidence: FamilyEvidence, before: list[Finding]) -> float:
+    """Logarithm of the modulation over that of the strongest finding before: 0 for the first, -3 at least.
+
+    What is found beside a much stronger fault is more often a trace of that than a fault.
+    """
+    values = (one.evidence["modulation"] for one in before)
+    strongest = max((value for value in values if isinstance(value, float)), default=evidence.modulation)
+    return min(0.0, max(-3.0, math.log(evidence.modulation / strongest)))
 
 
 def _share_of_two(shares: dict[str, float], component: str) -> float:

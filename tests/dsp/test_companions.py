@@ -1,0 +1,142 @@
+"""What one fault brings along is no second one; a second one is."""
+
+from dataclasses import replace
+
+import numpy as np
+from bearing_signals import Signal, defect, machine, noise, turns_of
+from pooling import verdict_of
+
+from gearsim_dsp.bands import Band
+from gearsim_dsp.families import BandLevel, FamilyEvidence
+from gearsim_dsp.judges.companions import heard_at, is_companion
+from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.kinematics import FaultFamily, bearing_orders
+from gearsim_io.nameplate import Bearing, Shaft
+
+RATE = 16_000.0
+SPEED = 24.8
+BPFI = 4.755
+
+
+def _plate(second_bpfo, elements=10):
+    """MFPT's bearing, and one whose outer race is passed `second_bpfo` times a turn, a channel for each."""
+    plate = machine(SPEED, tacho=True, bearings=2)
+    size = 1.0 - second_bpfo / (0.5 * elements)
+    other = Bearing("bearing_2", "shaft", elements, 40e-3 * size, 40e-3, 0.0, False, ("ch_2",))
+    assert abs(bearing_orders(other).bpfo - second_bpfo) < 1e-9
+    return replace(plate, bearings=(plate.bearings[0], other))
+
+
+def _spiky_inner_race(rng, turns):
+    """A load zone of a twentieth of a turn: sidebands far out, all about as high as the harmonics."""
+    bad = defect(rng, turns, RATE, BPFI, slip=0.002)
+    zone = np.exp(-0.5 * ((np.mod(turns, 1.0) - 0.5) / 0.06) ** 2)
+    x = bad.x * zone
+    return x / np.sqrt(np.mean(x**2))
+
+
+def test_sidebands_that_meet_another_bearings_order_are_no_fault_of_it():
+    """BPFI minus one turn is the other bearing's BPFO; both channels hear it."""
+    plate = _plate(BPFI - 1.0)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        turns = turns_of(SPEED, 4.0, RATE)
+        bad = _spiky_inner_race(rng, turns)
+        data = np.stack([noise(rng, turns.size) + 1.5 * bad, noise(rng, turns.size) + 0.9 * bad])
+        verdict = verdict_of(data, RATE, plate, Signal(bad, RATE, turns).tacho())
+        assert [(f.component, f.fault) for f in verdict.findings] == [("bearing_1", "inner_race")]
+
+
+def test_a_second_fault_that_is_loudest_at_its_own_bearing_is_found():
+    plate = _plate(3.93)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        turns = turns_of(SPEED, 4.0, RATE)
+        first = defect(rng, turns, RATE, BPFI, carrier_order=1.0).x
+        second = defect(rng, turns, RATE, 3.93, resonance_hz=5500.0).x
+        data = np.stack(
+            [
+                noise(rng, turns.size) + 0.9 * first + 0.3 * second,
+                noise(rng, turns.size) + 0.4 * first + 0.7 * second,
+            ]
+        )
+        verdict = verdict_of(data, RATE, plate, Signal(first, RATE, turns).tacho())
+        assert {(f.component, f.fault) for f in verdict.findings} == {
+            ("bearing_1", "inner_race"),
+            ("bearing_2", "outer_race"),
+        }
+
+
+def test_no_cage_is_blamed_for_the_beat_of_a_race_with_the_shaft():
+    """BPFI less five turns of the shaft is -0.245, next to where the slow shaft's cage would be."""
+    plate = _plate(3.93)
+    slow = replace(plate.bearings[1], shaft="slow")
+    cage = bearing_orders(slow).ftf
+    ratio = (5.0 - BPFI) / cage
+    shafts = (*plate.shafts, Shaft("slow", ratio, SPEED * ratio))
+    plate = replace(plate, shafts=shafts, bearings=(plate.bearings[0], slow))
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        turns = turns_of(SPEED, 4.0, RATE)
+        bad = _spiky_inner_race(rng, turns)
+        data = np.stack([noise(rng, turns.size) + 2.0 * bad, noise(rng, turns.size) + 1.2 * bad])
+        verdict = verdict_of(data, RATE, plate, Signal(bad, RATE, turns).tacho())
+        assert [(f.component, f.fault) for f in verdict.findings] == [("bearing_1", "inner_race")]
+
+
+BAND = Band(2000.0, 4000.0, "bank")
+RESOLUTION = 0.02
+
+
+def _evidence(order, modulation, levels, dominance=5.0):
+    """A family found at an order, as loud as told on each channel."""
+    family = FaultFamily("bearing_2", "outer_race", order, 0.0, "BPFO", 0.012)
+    return [
+        FamilyEvidence(
+            family,
+            channel,
+            BAND,
+            order,
+            order * SPEED,
+            (20.0, 15.0, 10.0),
+            (),
+            20.0,
+            1e-12,
+            modulation,
+            dominance,
+            (BandLevel(BAND, level, True),),
+            1,
+        )
+        for channel, level in levels.items()
+    ]
+
+
+def _first(order=BPFI, modulation=3.0):
+    details = {"modulation": modulation}
+    return Finding(
+        "bearing_1", "inner_race", order, order, order * SPEED, 30.0, 0.9, "severe", "ch_1", details
+    )
+
+
+def _companion(order, modulation, levels):
+    judged = _evidence(order, modulation, levels)
+    best = max(judged, key=lambda e: e.by_band[0].amplitude)
+    return is_companion(_plate(3.93), "bearing_2", judged, best, _first(), RESOLUTION)
+
+
+def test_sums_of_the_first_families_lines_turns_and_cage_are_companions():
+    """Where it is loudest at the second bearing, only the order speaks against it."""
+    plate = _plate(3.93)
+    cage = bearing_orders(plate.bearings[0]).ftf
+    loud_there = {"ch_1": 0.5, "ch_2": 1.0}
+    for order in (BPFI - 1, BPFI + 6, 2 * BPFI - 5.005, 15.0 - 3 * BPFI, BPFI - 1 + cage, 8 - BPFI - cage):
+        assert _companion(order, 0.3, loud_there), order
+        assert not _companion(order, 2.0, loud_there), "as strong as the first one, it is one of its own"
+    assert not _companion(3.93, 0.3, loud_there)
+
+
+def test_what_is_louder_at_the_first_bearing_is_a_companion():
+    assert not _companion(3.93, 0.3, {"ch_1": 0.5, "ch_2": 1.0})
+    assert _companion(3.93, 0.3, {"ch_1": 1.0, "ch_2": 0.5})
+    assert heard_at(_evidence(3.93, 0.3, {"ch_1": 1.0, "ch_2": 0.5}), ("ch_2",), ("ch_1",)) == 0.5
+    assert heard_at(_evidence(3.93, 0.3, {"ch_1": 1.0}), ("ch_2",), ("ch_1",)) == 1.0
