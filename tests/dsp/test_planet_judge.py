@@ -74,7 +74,7 @@ def test_too_few_turns_say_nothing():
 
 def test_the_profile_of_pure_noise_does_not_stand_out():
     rng = np.random.default_rng(4)
-    found = [find_impulses(rng.gamma(40.0, 1 / 40.0, 160)).stands_out for _ in range(300)]
+    found = [find_impulses(rng.gamma(40.0, 1 / 40.0, 160)).stands_out() for _ in range(300)]
     assert not any(found)
 
 

@@ -1,4 +1,4 @@
-"""Weights of the confidence and of the two discriminants, fitted to results of one seed.
+"""Weights of the confidence and of the discriminants, fitted to results of one seed.
 
 Logistic regression with a ridge (a Gaussian prior on standardised weights), so that faults whose findings
 were all right do not get infinite weights; one wrong finding with the mean numbers is added to each model, as
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import gearsim_dsp.judges
+from gearsim_bringup.evaluation.fit_side import fit_side
 from gearsim_bringup.evaluation.score import is_right, judged
 from gearsim_dsp.judges.tooth_kind import KIND_FEATURES
 
@@ -67,15 +68,7 @@ def fit_all(results: Sequence[Result], source: str, folder: Path = _FOLDER) -> l
         if t["fault"] in ("gear_tooth_spall", "gear_tooth_crack")
     ]
     said.append(_discriminant(kinds, folder / "tooth_kind.json", source, list(KIND_FEATURES)))
-    sides = [
-        (f["evidence"]["side_features"], t["side"] == "sun")
-        for one in fine
-        for f in one["findings"]
-        if "side_features" in f["evidence"]
-        for t in one["truths"]
-        if t["fault"] == "planet_tooth_spall"
-    ]
-    said.append(_discriminant(sides, folder / "planet_side.json", source, []))
+    said.append(fit_side(fine, folder / "planet_side.json", source))
     said.append(_confidence(fine, folder / "confidence.json", source))
     return said
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from gearsim_dsp.diagnose import LEAST_CONFIDENCE
 from gearsim_dsp.judges.confidence import confidence
-from gearsim_dsp.judges.planet_side import side_of
+from gearsim_dsp.judges.planet_side import side_words
 from gearsim_dsp.judges.tooth_kind import kind_of
 
 __all__ = ["rejudged"]
@@ -32,8 +32,8 @@ def rejudged(result: Result) -> Result:
             kind = kind_of(tuple(evidence["kind_features"]))
             finding["fault"] = kind.fault
             features["kind"] = math.log(kind.probability / max(1.0 - kind.probability, 1e-3))
-        if "side_features" in evidence:
-            evidence["side"], evidence["side_confidence"] = side_of(evidence["side_features"])
+        if "side_variances" in evidence:
+            evidence.update(side_words(evidence["side_features"], evidence["side_variances"]))
         finding["confidence"] = confidence(finding["fault"], features)
     sure = [
         one for one in fresh["findings"] if one["confidence"] >= LEAST_CONFIDENCE or one["fault"] == "crashed"

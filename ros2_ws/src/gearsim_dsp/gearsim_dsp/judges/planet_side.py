@@ -1,94 +1,148 @@
 """Which flank of a planet's tooth is spalled: that to the sun or that to the ring.
 
-A spall pushes where it is: a pit to the sun moves sun and planet first, and what it excites most strongly
-lies at other frequencies than for a pit to the ring. So the impulse's energies in five bands on the sensors
-at ring, sun and carrier differ. A linear discriminant of their ratios, fitted to simulated stages with
-masses and stiffnesses up to 40 % off those of the UNSW insert, tells the sides; it needs all three sensors
-and says how sure it is. For stages of quite another size it was not fitted, and the side stays open.
+A blow in the mesh with the sun and one in the mesh with the ring send sun, ring and carrier off in different
+ways. What depends neither on the size of the spall nor on its shape are ratios of the answers: at some
+thousand hertz the sun's centre runs round with the carrier after a blow at its own mesh and against it after
+one at the ring, by 3 to 10 dB; higher up what was struck is the louder one. So, for the coherent averages of
+`synchronous.whirl` over the turn of the planet, in six bands:
+
+    forward over backward whirl of the sun, of the ring;  ring over sun;  carrier over sun   (ln of energies)
+
+Each is known with a variance V, from what the other teeth show. To stages with the same fault they differ as
+their masses and springs do: by Gaussians about means m_sun and m_ring with one covariance S, fitted to
+simulated stages up to 40 % off the UNSW insert, as V is taken out. Then the likelihood ratio is
+
+    ln L = (m_sun - m_ring)^T (S + V)^-1 (x - (m_sun + m_ring) / 2)
+
+What is not measured (V without limit) says nothing: ring or carrier may lack a sensor. ln L is cut where the
+number of stages cannot back more, and a factor, fitted to stages that were left out, makes a logistic
+probability of it. Below 0.9 the side is told to be open. Stages of quite another size were not fitted.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.signal import butter, sosfiltfilt
+from numpy.typing import NDArray
 
-from gearsim_dsp.judges.measured import Measured
-from gearsim_io.nameplate import PlanetaryStage
+from gearsim_dsp.judges.planet_turns import TURN_BANDS_HZ
+from gearsim_dsp.synchronous.whirl import ToothBlow, blow_of_tooth
 
-if TYPE_CHECKING:
-    from gearsim_dsp.judges.planet import FoldedResidual
+__all__ = [
+    "SIDE_BANDS_HZ",
+    "SURE",
+    "UNKNOWN_VARIANCE",
+    "log_likelihood_ratio",
+    "side_of",
+    "side_words",
+    "spall_side",
+]
 
-__all__ = ["SIDE_BANDS_HZ", "side_of", "spall_side"]
+Array = NDArray[np.float64]
 
-SIDE_BANDS_HZ = ((300.0, 1500.0), (1500.0, 3000.0), (3000.0, 5000.0), (5000.0, 8000.0), (8000.0, 13000.0))
-_SENSORS = ("ring", "carrier", "sun")
-_LEAST_SHARE = 1e-6
+_SKIPPED = 2  # bands in which both sides sound alike
+SIDE_BANDS_HZ = TURN_BANDS_HZ[_SKIPPED:]
+SURE = 0.9
+UNKNOWN_VARIANCE = 1e6
+_HEARD = 3.0  # the louder of two energies stands this many standard deviations over the other teeth
+_SENSORS = ("sun", "ring", "carrier")
 
 
-def spall_side(
-    measured: Measured, stage: PlanetaryStage, folded: list[FoldedResidual], place: int
-) -> dict[str, object]:
-    """Side of a spall for the evidence of its finding: `side`, `side_confidence` and `side_features`.
+def spall_side(turns: Mapping[str, NDArray[np.complex128]], teeth: int, place: float) -> dict[str, object]:
+    """Side of a spall for the evidence of its finding.
 
     Parameters
     ----------
-    measured : Measured
-    stage : PlanetaryStage
-    folded : list of FoldedResidual
-    place : int
-        Bin of the folded residual at which the tooth stands out.
+    turns : mapping of str to ndarray of complex, shape (2, bands, parts, bins)
+        Averaged turns of the planet by channel (`planet_turns.averaged_turns`).
+    teeth : int
+        Of the planet.
+    place : float
+        Where the tooth strikes, in turns of the planet.
+
+    Returns
+    -------
+    dict
+        `side`: "sun", "ring", "undecided", or "not told" where the sensors cannot tell; `side_reason` in
+        words; unless not told, `side_confidence` of the more probable side, and what it follows from.
     """
-    by_name = {one.channel: one for one in folded}
-    if not set(_SENSORS) <= set(by_name) or measured.sample_rate_hz < 2.1 * SIDE_BANDS_HZ[-1][1]:
-        return {"side": "not told"}
-    assert measured.phase is not None
-    levels = [_levels(measured, stage, by_name[name], place) for name in _SENSORS]
-    ring, carrier, sun = (np.log10(level) for level in levels)
-    features = [*(ring - sun), *(carrier - sun)]
-    rounded = [round(float(value), 4) for value in features]
-    side, sure = side_of(rounded)
-    return {"side": side, "side_confidence": sure, "side_features": rounded}
+    means = {name: turns[name].mean(axis=0)[_SKIPPED:] for name in _SENSORS if name in turns}
+    blows = {name: blow_of_tooth(mean, teeth, place) for name, mean in means.items()}
+    if "sun" not in blows or means["sun"].shape[1] < 3 or not means["sun"].size:
+        return {"side": "not told", "side_reason": "it takes a sensor at the sun, and a carrier that turns"}
+    # Rounded first, so that what is written decides as what was measured did.
+    values, variances = ([float(f"{one:.4g}") for one in numbers] for numbers in _ratios(blows))
+    told = side_words(values, variances)
+    return {**told, "side_features": values, "side_variances": variances}
 
 
-def side_of(features: list[float]) -> tuple[str, float]:
-    """Side and its probability from the ten logarithms of energy ratios."""
+def side_words(values: Sequence[float], variances: Sequence[float]) -> dict[str, object]:
+    """What is said of these numbers: `side`, `side_reason`, `side_confidence`."""
+    side, sure = side_of(values, variances)
+    if sure >= SURE:
+        said = f"the flank that meets the {side} (probability {sure:.2f})"
+        return {"side": side, "side_reason": said, "side_confidence": sure}
+    said = f"undecided which flank: that to the {side} is more probable, at {sure:.2f} too little to say so"
+    return {"side": "undecided", "side_reason": said, "side_confidence": sure}
+
+
+def side_of(values: Sequence[float], variances: Sequence[float]) -> tuple[str, float]:
+    """The more probable side and its probability.
+
+    Parameters
+    ----------
+    values, variances : sequence of float
+        Of the logarithms of energy ratios, four for each of `SIDE_BANDS_HZ`; `UNKNOWN_VARIANCE` and above:
+        not measured.
+    """
     model = _model()
-    total = model["offset"] + float(np.dot(model["weights"], features))
-    probability = 1.0 / (1.0 + math.exp(-max(min(total, 60.0), -60.0)))
-    return ("sun" if probability >= 0.5 else "ring"), max(probability, 1.0 - probability)
+    ratio = log_likelihood_ratio(model, np.asarray(values), np.asarray(variances))
+    sure = 1.0 / (1.0 + math.exp(-model["factor"] * min(abs(ratio), model["most"])))
+    return ("sun" if ratio >= 0.0 else "ring"), sure
 
 
-def _levels(
-    measured: Measured, stage: PlanetaryStage, folded: FoldedResidual, place: int
-) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Energy of the impulse over the floor in each band."""
-    turns_per = folded.energy.shape[0]
-    bins = folded.energy.shape[1]
-    phase = measured.phase
-    assert phase is not None
-    scale = abs(stage.member_ratios()["planet"])
-    turns = np.interp(np.arange(folded.residual.size), phase.samples, phase.turns * scale)
-    first = math.ceil(turns[folded.length])
-    begin, end = np.searchsorted(turns, [first, first + turns_per])
-    index = ((turns[begin:end] - first) * bins).astype(np.intp) % bins
-    count = np.maximum(np.bincount(index, minlength=bins), 1)
-    found = []
-    for band in SIDE_BANDS_HZ:
-        sos = butter(3, band, "bandpass", fs=measured.sample_rate_hz, output="sos")
-        part = sosfiltfilt(sos, folded.residual)[begin:end]
-        profile = uniform_filter1d(
-            np.bincount(index, part**2, bins) / count, bins // stage.planet_teeth, mode="wrap"
-        )
-        floor = float(np.median(profile))
-        found.append(max(float(profile[place]) - floor, _LEAST_SHARE * floor, 1e-30))
-    return np.array(found)
+def log_likelihood_ratio(model: dict[str, Any], values: Array, variances: Array) -> float:
+    """Of a spall to the sun against one to the ring."""
+    known = variances < UNKNOWN_VARIANCE
+    if not known.any():
+        return 0.0
+    sun, ring = np.asarray(model["mean_sun"])[known], np.asarray(model["mean_ring"])[known]
+    spread = np.asarray(model["covariance"])[np.ix_(known, known)] + np.diag(variances[known])
+    return float((sun - ring) @ np.linalg.solve(spread, values[known] - 0.5 * (sun + ring)))
+
+
+def _ratios(blows: dict[str, ToothBlow]) -> tuple[Array, Array]:
+    """Logarithms of the four energy ratios in each band, and their variances."""
+    values = np.zeros((len(SIDE_BANDS_HZ), 4))
+    variances = np.full_like(values, UNKNOWN_VARIANCE)
+    energies: dict[str, Array] = {}
+    for name, blow in blows.items():
+        net, variance = blow.net, blow.variance
+        if name != "carrier" and net.shape[1] == 3:
+            column = 0 if name == "sun" else 1
+            for row, (one, its) in enumerate(zip(net, variance, strict=True)):
+                values[row, column], variances[row, column] = _ratio(one[0], its[0], one[1], its[1])
+            net, variance = net[:, :2], variance[:, :2]
+        energies[name] = np.stack([net.sum(axis=1), variance.sum(axis=1)])
+    for column, name in ((2, "ring"), (3, "carrier")):
+        if name in energies:
+            for row, (one, sun) in enumerate(zip(energies[name].T, energies["sun"].T, strict=True)):
+                values[row, column], variances[row, column] = _ratio(one[0], one[1], sun[0], sun[1])
+    return values.ravel(), variances.ravel()
+
+
+def _ratio(one: float, one_variance: float, other: float, other_variance: float) -> tuple[float, float]:
+    """Logarithm of the ratio of two energies and its variance; unknown where neither is heard."""
+    relative = one_variance / one**2, other_variance / other**2
+    if min(relative) > 1.0 / _HEARD**2:
+        return 0.0, UNKNOWN_VARIANCE
+    return math.log(one / other), min(relative[0] + relative[1], UNKNOWN_VARIANCE)
 
 
 @cache
