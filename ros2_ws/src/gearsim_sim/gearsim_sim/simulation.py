@@ -196,24 +196,34 @@ def _told(scenario: Scenario, act: Callable[[], _T]) -> _T:
 
 
 def simulate(
-    scenario: Scenario, seconds: float, t0_ns: int = 0, model: RunningModel | None = None
+    scenario: Scenario,
+    seconds: float,
+    t0_ns: int = 0,
+    model: RunningModel | None = None,
+    between: Callable[[], None] = lambda: None,
 ) -> Iterator[Batch]:
     """The batches of a whole run as fast as they can be made: round(seconds x rate) samples.
 
-    The last batch is shorter if need be. Parameters as for `Simulation`.
+    The last batch is shorter if need be. Parameters as for `Simulation`; `between` is called before each
+    batch, and may end the run by an exception.
     """
     simulation = Simulation(scenario, t0_ns, model)
     total = round(seconds * scenario.sample_rate_hz)
     for start in range(0, total, scenario.batch_samples):
+        between()
         yield from simulation.advance(min(scenario.batch_samples, total - start))
     yield from simulation.finish()
 
 
 def to_record(
-    scenario: Scenario, seconds: float, t0_ns: int = 0, model: RunningModel | None = None
+    scenario: Scenario,
+    seconds: float,
+    t0_ns: int = 0,
+    model: RunningModel | None = None,
+    between: Callable[[], None] = lambda: None,
 ) -> Record:
-    """A whole run in memory; `seconds` must give at least one sample."""
-    batches = list(simulate(scenario, seconds, t0_ns, model))
+    """A whole run in memory; `seconds` must give at least one sample. Parameters as for `simulate`."""
+    batches = list(simulate(scenario, seconds, t0_ns, model, between))
     samples = [batch for batch in batches if isinstance(batch, SampleBatch)]
     if not samples:
         raise InputError("simulation", "seconds", seconds, "long enough for one sample")

@@ -21,6 +21,7 @@ from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
 from gearsim_twin.modelled import Modelled, describe
 from gearsim_twin.recordings import cut, only, same_recording, thinned
+from gearsim_twin.view import View, view_of
 
 __all__ = ["LEAST_PERIODS", "Case", "least_seconds", "load_case", "make_case"]
 
@@ -48,6 +49,8 @@ class Case:
         empty). All have the same channels and rate.
     split : bool
         True where the held-out records are the last third of the others, as none were given.
+    wholes : tuple of Record
+        The records before they were split; empty where they were not.
     modelled : Modelled
         What the model tells of the machine.
     remarks : tuple of str
@@ -63,6 +66,24 @@ class Case:
     split: bool
     modelled: Modelled
     remarks: tuple[str, ...] = ()
+    wholes: tuple[Record, ...] = ()
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """All records: those for training, those held out, those of the healthy machine."""
+        return (*self.training, *self.holdout, *self.healthy)
+
+    def views(self) -> tuple[View, ...]:
+        """Each of `records` with its angle, which for the parts of a record is found over the whole."""
+        healthy = tuple(view_of(record, self.machine) for record in self.healthy)
+        if not self.split:
+            both = tuple(view_of(record, self.machine) for record in (*self.training, *self.holdout))
+            return (*both, *healthy)
+        wholes = [view_of(record, self.machine) for record in self.wholes]
+        ends = [record.sample_count for record in self.training]
+        training = tuple(view.part(0, end) for view, end in zip(wholes, ends, strict=True))
+        held = (view.part(end, view.record.sample_count) for view, end in zip(wholes, ends, strict=True))
+        return (*training, *held, *healthy)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -155,20 +176,30 @@ def make_case(
     groups = _one_unit(groups, remarks)
     groups = _one_set_of_channels(groups, machine, modelled, model, remarks)
     _check_distinct(groups)
-    training, held, split = groups["MEASURED"], groups["--holdout"], False
+    training, held = groups["MEASURED"], groups["--holdout"]
+    wholes: tuple[Record, ...] = ()
     if held:
         for record in (*training, *held):
             _check_length(record, machine, 1)
     else:
         for record in training:
             _check_length(record, machine, _HELD_OUT_SHARE)
-        parts = [_split(record) for record in training]
-        training, held, split = tuple(one for one, _ in parts), tuple(one for _, one in parts), True
+        wholes = training
+        training, held = tuple(_split(one)[0] for one in wholes), tuple(_split(one)[1] for one in wholes)
         remarks.append("no held-out record was given: the last third of each record is held out")
     for record in groups["--healthy"]:
         _check_length(record, machine, 1)
     return Case(
-        machine, machine_path, model, training, held, groups["--healthy"], split, modelled, tuple(remarks)
+        machine=machine,
+        machine_path=machine_path,
+        model=model,
+        training=training,
+        holdout=held,
+        healthy=groups["--healthy"],
+        split=bool(wholes),
+        modelled=modelled,
+        remarks=tuple(remarks),
+        wholes=wholes,
     )
 
 

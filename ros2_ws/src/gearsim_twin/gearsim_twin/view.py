@@ -7,7 +7,7 @@ samples to features does wrong it does wrong on both sides.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
 from gearsim_twin.load import stated_load_nm
+from gearsim_twin.recordings import cut
 
 __all__ = ["View", "view_of"]
 
@@ -114,6 +115,22 @@ class View:
         edges[-1] = max(last, edges[-2] + 1.0 / self.record.sample_rate_hz)
         return middles, np.diff(turns) / np.diff(edges)
 
+    def part(self, first: int, end: int) -> View:
+        """The view of samples `first` to `end` (not included), with the angle found over the whole."""
+        record = cut(self.record, first, end)
+        load_nm = stated_load_nm(record, self.machine)
+        phase = self.phase
+        if phase is None:
+            return View(record, self.machine, self.speed, load_nm, self.issues)
+        inside = (phase.samples > first) & (phase.samples < end - 1)
+        samples = np.concatenate(([first], phase.samples[inside], [end - 1.0]))
+        turns = np.interp(samples, phase.samples, phase.turns)
+        value = float(turns[-1] - turns[0]) / (end - 1 - first) * record.sample_rate_hz
+        half = self.speed.relative_error * value
+        ends = (value - half, value + half)
+        speed = replace(self.speed, value_hz=value, ci95_hz=ends, phase=Phase(samples - first, turns))
+        return View(record, self.machine, speed, load_nm, self.issues)
+
 
 def view_of(record: Record, machine: Machine) -> View:
     """A record with the best angle there is: its tachos or encoders, else found in the vibration.
@@ -126,9 +143,37 @@ def view_of(record: Record, machine: Machine) -> View:
     """
     plate = machine_for(record, machine)
     found = record_speed(record, plate)
-    speed = found.speed if found.speed is not None else _mean_speed(record, plate)
-    issues = (*found.issues, *_issues(record, plate, found, speed))
+    issues = found.issues
+    speed = found.speed
+    if speed is None:
+        speed = _mean_speed(record, plate)
+    elif speed.source == "estimated":
+        speed, doubts = _second_opinion(speed, _mean_speed(record, plate), record.seconds)
+        issues = (*issues, *doubts)
+    issues = (*issues, *_issues(record, plate, found, speed))
     return View(record, plate, speed, stated_load_nm(record, plate), issues)
+
+
+def _second_opinion(
+    tracked: ShaftSpeed, mean: ShaftSpeed, seconds: float
+) -> tuple[ShaftSpeed, tuple[QualityIssue, ...]]:
+    """The tracked speed; where mean spectra tell clearly another, its interval holds both, and that is told.
+
+    A spectrum tells the speed no better than half a line of the record at the first order.
+    """
+    if mean.source != "estimated":
+        return tracked, ()
+    apart = abs(tracked.value_hz - mean.value_hz)
+    known = math.hypot(*(0.5 * (one.ci95_hz[1] - one.ci95_hz[0]) for one in (tracked, mean)), 0.5 / seconds)
+    if apart <= known:
+        return tracked, ()
+    low = min(*tracked.ci95_hz, *mean.ci95_hz)
+    high = max(*tracked.ci95_hz, *mean.ci95_hz)
+    detail = (
+        f"followed through the record its lines tell {tracked.value_hz:.5g} Hz, those of its mean spectrum "
+        f"{mean.value_hz:.5g} Hz; a tacho would decide"
+    )
+    return replace(tracked, ci95_hz=(low, high)), (QualityIssue("speed_doubtful", "", detail),)
 
 
 def _mean_speed(record: Record, machine: Machine) -> ShaftSpeed:

@@ -1,0 +1,215 @@
+"""What a model gives in place of a measured record, in the very form that measured records have.
+
+A simulated record is read over the same kind of angle as the measured one: over its own tachos or encoders
+where the measured angle is from such, else over the angle that the judge takes the measured record's shaft
+to have. A model that runs at another speed than assumed then shows its lines where the measured record of
+such a machine would.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
+
+from gearsim_dsp.speed import Phase, ShaftSpeed, window_speed
+from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
+from gearsim_io.record import PulseTrain, Record
+from gearsim_sim.scenario import parse_scenario
+from gearsim_sim.simulation import to_record
+from gearsim_twin.case import Case
+from gearsim_twin.load import stated_load_nm
+from gearsim_twin.view import View
+from gearsim_twin.workers import WorkerLostError, Workers, check_stop
+
+__all__ = ["Simulator"]
+
+T = TypeVar("T")
+Content = Mapping[str, Any]
+
+# Names the content in errors; a relative path in it starts at the present folder.
+_SOURCE = Path("model")
+_MOST_BYTES = 400_000_000
+
+
+class Simulator:
+    """Runs models under the conditions of a case's records.
+
+    Parameters
+    ----------
+    case : Case
+    workers : int
+        Processes; 1 simulates in this one.
+    measured : sequence of View, optional
+        `case.views()`, where that is known already.
+
+    Notes
+    -----
+    Use it in a `with` block, or `close` it: no process is left then, nor after an interruption. Views are
+    kept, up to 400 MB of samples; the same content, length and seed is simulated once.
+    """
+
+    def __init__(self, case: Case, workers: int = 1, measured: Sequence[View] | None = None) -> None:
+        if workers < 1:
+            raise InputError("simulator", "workers", workers, "1 or more")
+        self.case = case
+        self.measured = case.views() if measured is None else tuple(measured)
+        self._workers = workers
+        self._pool: Workers | None = None
+        self._kept: OrderedDict[str, View] = OrderedDict()
+
+    def __enter__(self) -> Simulator:
+        """Nothing runs before it is needed."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End all processes."""
+        self.close()
+
+    def close(self) -> None:
+        """End all processes; what runs is given up."""
+        if self._pool is not None:
+            self._pool.close()
+            self._pool = None
+
+    def views(
+        self, content_of: Mapping[int, Content], seconds: float | None = None, seed: int = 1
+    ) -> list[View]:
+        """What models give in place of records.
+
+        Parameters
+        ----------
+        content_of : mapping of int to mapping
+            Number of a record in `case.records`, and the content of the scenario that takes its place.
+        seconds : float, optional
+            Length; by default that of the record.
+        seed : int
+            Of all random numbers.
+
+        Returns
+        -------
+        list of View
+            In the order of the mapping.
+
+        Raises
+        ------
+        InputError
+            If the simulator refuses a content, naming its key.
+        """
+        return self.derived(list(content_of.items()), _itself, seconds, seed)
+
+    def derived(
+        self,
+        jobs: Sequence[tuple[int, Content]],
+        then: Callable[[View], T],
+        seconds: float | None = None,
+        seed: int = 1,
+    ) -> list[T]:
+        """What `then` makes of the views, one for each (number of a record, content).
+
+        With several workers it is called where the simulation ran, and must be picklable: a function of a
+        module, or `functools.partial` of one. Parameters and errors as for `views`.
+        """
+        tasks = [self._task(number, content, seconds, seed) for number, content in jobs]
+        if self._workers == 1 or len(tasks) < 2:
+            return [then(self._view(task)) for task in tasks]
+        if self._pool is None:
+            self._pool = Workers(self._workers)
+        try:
+            return self._pool.map(_done, [(task, then) for task in tasks])
+        except WorkerLostError:
+            # A process was killed from outside; what it can do this one can.
+            self.close()
+            self._workers = 1
+            return [then(self._view(task)) for task in tasks]
+        except BaseException:
+            self.close()
+            raise
+
+    def _task(self, number: int, content: Content, seconds: float | None, seed: int) -> _Task:
+        view = self.measured[number]
+        length = view.record.seconds if seconds is None else seconds
+        return _Task({**copy.deepcopy(dict(content)), "seed": seed}, length, view.machine, view.speed)
+
+    def _view(self, task: _Task) -> View:
+        key = task.key
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        view = self._kept[key] = task.view()
+        while (
+            len(self._kept) > 1 and sum(one.record.data.nbytes for one in self._kept.values()) > _MOST_BYTES
+        ):
+            self._kept.popitem(last=False)
+        return view
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """A simulation, and what is taken as the speed of the measured record that it stands for."""
+
+    content: dict[str, Any]
+    seconds: float
+    machine: Machine
+    measured: ShaftSpeed
+
+    @property
+    def key(self) -> str:
+        """What makes two simulations the same."""
+        axis = (self.measured.value_hz, self.measured.source, self.measured.phase is not None)
+        return json.dumps([self.content, self.seconds, axis, self.machine.name], sort_keys=True, default=str)
+
+    def view(self) -> View:
+        """The simulated record over the measured one's kind of angle."""
+        own = self.measured.source in ("tacho", "encoder")
+        content = self.content if own else _with_reference_tacho(self.content, self.machine)
+        scenario = parse_scenario(content, _SOURCE)
+        record = replace(to_record(scenario, self.seconds, between=check_stop), machine=self.machine.name)
+        speed = self._own_speed(record) if own else self._assumed_speed(record)
+        if not own:
+            record = replace(record, tachos=())
+        load_nm = stated_load_nm(record, self.machine)
+        return View(record, self.machine, speed, scenario.load_nm if load_nm is None else load_nm)
+
+    def _own_speed(self, record: Record) -> ShaftSpeed:
+        source = self.measured.source
+        trains = record.tachos or tuple(
+            PulseTrain(one.shaft, float(one.lines_per_revolution), one.samples) for one in record.encoders
+        )
+        return window_speed(trains, record.sample_count, record.sample_rate_hz, self.machine, source)
+
+    def _assumed_speed(self, record: Record) -> ShaftSpeed:
+        """The true angle, as far off as that of the measured record is if this model is right."""
+        if self.measured.phase is None:
+            return self.measured
+        true = window_speed(record.tachos, record.sample_count, record.sample_rate_hz, self.machine)
+        if true.phase is None:
+            return self.measured
+        scale = self.measured.value_hz / true.value_hz
+        phase = Phase(true.phase.samples, true.phase.turns * scale)
+        return replace(self.measured, phase=phase)
+
+
+def _with_reference_tacho(content: dict[str, Any], machine: Machine) -> dict[str, Any]:
+    """With one clean pulse per turn of the reference shaft: angles found in vibration are as smooth."""
+    changed = copy.deepcopy(content)
+    changed.setdefault("sensors", {})["tachos"] = {"shafts": [machine.reference_shaft], "pulses": 1}
+    return changed
+
+
+def _done(work: tuple[_Task, Callable[[View], T]]) -> T:
+    """In a worker: simulate, and make of it what is wanted."""
+    task, then = work
+    return then(task.view())
+
+
+def _itself(view: View) -> View:
+    return view

@@ -1,0 +1,79 @@
+"""Processes that work for one, and end when they are told to: also in the middle of a simulation."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import Any, TypeVar
+
+__all__ = ["StoppedError", "WorkerLostError", "Workers", "check_stop"]
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+# The flag of this process, if it is a worker.
+_flag: Any = None
+
+
+class StoppedError(RuntimeError):
+    """The work was given up, as nobody waits for it any more."""
+
+
+class WorkerLostError(RuntimeError):
+    """A process ended by itself, such as one that the system killed for memory."""
+
+
+def check_stop() -> None:
+    """Called by what runs in a worker, often: StoppedError once the work is to be given up."""
+    if _flag is not None and _flag.is_set():
+        raise StoppedError("given up")
+
+
+class Workers:
+    """Fresh processes, started when there is work.
+
+    Parameters
+    ----------
+    count : int
+        Processes.
+
+    Notes
+    -----
+    Fresh ones, because compiled loops and their thread pools do not survive a fork; a program that uses them
+    must be importable without running (`if __name__ == "__main__"`). An interrupt from the keyboard reaches
+    this process alone, which then tells the others.
+    """
+
+    def __init__(self, count: int) -> None:
+        context = get_context("spawn")
+        self._stop = context.Event()
+        self._executor = ProcessPoolExecutor(count, context, _begin, (self._stop,))
+
+    def map(self, function: Callable[[A], R], arguments: Sequence[A]) -> list[R]:
+        """`function` of each argument, in their order; both must be picklable.
+
+        Raises
+        ------
+        WorkerLostError
+            If a process ended.
+        """
+        try:
+            futures = [self._executor.submit(function, argument) for argument in arguments]
+            return [future.result() for future in futures]
+        except BrokenProcessPool as error:
+            raise WorkerLostError(str(error)) from error
+
+    def close(self) -> None:
+        """End all processes; what they work at is given up."""
+        self._stop.set()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _begin(flag: Any) -> None:
+    global _flag
+    _flag = flag
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
