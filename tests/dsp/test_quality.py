@@ -103,3 +103,21 @@ def test_an_inverter_carrier_is_named():
 
 def test_a_short_signal_says_nothing():
     assert find_electrical_lines(np.zeros(1000), RATE).supply_hz == 0.0
+
+
+def test_harmonics_of_a_mesh_whose_speed_is_not_known_well_are_no_inverter():
+    """32 teeth at 12.5 Hz pass at 400 Hz: each fifth harmonic is a multiple of 500 Hz and has its double."""
+    t = np.arange(round(6 * RATE)) / RATE
+    x = noise(np.random.default_rng(6), t.size)
+    x = x + sum(3.0 / k**0.5 * np.cos(2 * np.pi * 400.0 * k * t + k) for k in range(1, 15))
+    known = find_electrical_lines(x, RATE, 0.0, [12.5, 400.0], 1e-4)
+    unknown = find_electrical_lines(x, RATE, 0.0, [12.7, 406.4], 1e-3)
+    assert known.carriers_hz == unknown.carriers_hz == ()
+
+
+def test_a_carrier_among_mesh_harmonics_is_named():
+    t = np.arange(round(6 * RATE)) / RATE
+    x = noise(np.random.default_rng(7), t.size)
+    x = x + sum(3.0 / k**0.5 * np.cos(2 * np.pi * 385.0 * k * t + k) for k in range(1, 15))
+    x = x + 2.0 * np.cos(2 * np.pi * 2500.0 * t) + np.cos(2 * np.pi * 5000.0 * t)
+    assert find_electrical_lines(x, RATE, 0.0, [12.0], 1e-3).carriers_hz == pytest.approx((2500.0,), abs=0.1)

@@ -73,6 +73,18 @@ def test_levels_in_an_unknown_unit_are_not_judged():
     assert findings == ()
 
 
+def test_a_fault_that_grows_counts_as_large_as_it_has_become():
+    """From nothing to 3 mm/s in three seconds: 1.5 on average, under the limit of 1.8."""
+    size = turns(SPEED_HZ, SECONDS).size
+    growth = np.linspace(0.0, 1.0, size)
+    _, (finding,) = judge({"in_y": growth * line(1, 3.0), "in_x": growth * line(1, 3.0, 1.9)})
+    assert (finding.component, finding.fault) == ("input", "unbalance")
+    # 5/6 of the growth in the middle of the last third.
+    assert finding.evidence["velocity_mm_s"] == pytest.approx(2.5, rel=0.02)
+    _, none = judge({"in_y": 0.5 * growth * line(1, 3.0), "in_x": 0.5 * growth * line(1, 3.0, 1.9)})
+    assert none == ()
+
+
 def hum(amplitudes_m_s2, frequency_hz=50.0):
     """Acceleration that a ground loop feigns: the supply and its multiples."""
     t = np.arange(round(SECONDS * 16384)) / 16384.0

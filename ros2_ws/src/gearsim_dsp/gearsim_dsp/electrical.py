@@ -31,6 +31,8 @@ _CARRIER_GRID_HZ = 500.0
 _CARRIER_ERROR = 5e-4
 _ALONE_HZ = 45.0
 _ALONE_DB = 12.0
+_SERIES_NUMBER = 24  # 25 Hz with 32 teeth: 4000 Hz is the fifth harmonic, 20,000 Hz the 25th
+_SERIES_DB = 25.0  # of a harmonic's neighbours below it
 _LEAST_SHARE = 1e-9  # of a carrier in the signal's power
 _LONGEST = 1 << 20
 _BLOCK_LINES = 256
@@ -192,11 +194,30 @@ def _carriers(
         line = round(place / step_hz)
         if share[line - 1 : line + 2].sum() < _LEAST_SHARE or not _alone(height_db, line, step_hz):
             continue
+        if _in_a_series(height_db, place / step_hz):
+            continue
         double = round(2 * place / step_hz)
         around = height_db[double - 2 : double + 3]
         if around.size and around.max() >= _DOUBLE_DB:
             found.append(float(place))
     return found
+
+
+def _in_a_series(height_db: NDArray[np.float64], place: float) -> bool:
+    """True for one of many harmonics, as of a gear mesh: whole parts of it and their multiples stand beside.
+
+    A carrier has lines at its own multiples only. `place` in lines.
+    """
+    least = float(height_db[round(place)]) - _SERIES_DB
+    for number in range(2, _SERIES_NUMBER + 1):
+        near = np.array([k for k in range(number - 3, number + 4) if k > 0 and k != number])
+        at = np.round(near * place / number).astype(np.intp)
+        if at[-1] + 2 >= height_db.size or at[0] < 4:
+            continue
+        top = np.maximum(height_db[at], np.maximum(height_db[at - 1], height_db[at + 1]))
+        if np.count_nonzero(top >= max(least, _SUPPLY_DB)) >= max(4, near.size - 1):
+            return True
+    return False
 
 
 def _alone(height_db: NDArray[np.float64], line: int, step_hz: float) -> bool:

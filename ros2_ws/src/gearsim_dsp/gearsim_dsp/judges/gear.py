@@ -7,8 +7,12 @@ From the synchronous average over the turn of each wheel (`gear_signs`):
   linear discriminant of size, duration and pitch of the event tells the two (see `tooth_kind`);
 - worn flanks raise the mesh harmonics, and scatter between the teeth raises the difference signal all round.
 
+Where there are encoders on both shafts of a mesh the transmission error between them is the better witness of
+single teeth and of wear (`encoder_gear`): a crack hardly shakes a gearbox, but its tooth yields.
+
 A wheel off its axis hardly shakes a stiff gearbox; it shows in the transmission error between two encoders,
-once a turn, in parts of the tooth pitch. Run-out of grade 10 of ISO 1328 is some 0.5 % of it.
+once a turn, in parts of the tooth pitch. Run-out of grade 10 of ISO 1328 is some 0.5 % of it; sound random
+gearboxes reach 0.67 %.
 
 Wheels that turn at one speed leave their marks in the same average: the component is then the mesh, not one
 of its wheels.
@@ -17,13 +21,16 @@ of its wheels.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from gearsim_dsp.judges.confidence import confidence
+from gearsim_dsp.judges.encoder_gear import bad_tooth_of_mesh, worn_wheel_of_mesh
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.gear_signs import ShaftSigns, shaft_signs
 from gearsim_dsp.judges.measured import Measured, wheels_on
 from gearsim_dsp.judges.runout import wheel_runout
+from gearsim_dsp.judges.tooth_errors import ToothError, tooth_errors
 from gearsim_dsp.judges.tooth_kind import tooth_kind
 from gearsim_io.nameplate import GearMesh
 
@@ -36,7 +43,8 @@ _TOOTH_LOG10_CHANCE = -4.0
 _TOOTH_OVER_DOUBT = 6.0
 _WEAR_SPREAD = 0.06
 _WEAR_HARMONICS = 0.35
-_RUNOUT_OF_PITCH = 0.010
+_WEAR_MEAN, _WEAR_EACH = 1.2, 0.75  # sound gearboxes reach means of 1.12
+_RUNOUT_OF_PITCH = 0.0075
 _SEVERE_TOOTH, _MODERATE_TOOTH = 300.0, 30.0
 
 
@@ -48,10 +56,36 @@ def judge_gears(measured: Measured) -> tuple[Finding, ...]:
     geared = {s for mesh in machine.gear_meshes for s in (mesh.driving_shaft, mesh.driven_shaft)}
     ratios = {round(machine.shaft(name).ratio, 9): machine.shaft(name).ratio for name in sorted(geared)}
     signs = [one for ratio in ratios.values() for one in shaft_signs(measured, ratio)]
-    found = [finding for one in _strongest_teeth(signs) if (finding := _bad_tooth(measured, one))]
-    found += _wear(measured, signs, found)
+    errors = {mesh.name: tooth_errors(measured, mesh) for mesh in machine.gear_meshes}
+    found = _by_encoders(measured, signs, errors, bad_tooth_of_mesh)
+    found += [_bad_tooth(measured, one) for one in _strongest_teeth(signs)]
+    # Both witnesses speak of one tooth; the surer one is heard.
+    found = sorted(found, key=lambda one: -one.confidence)[:1]
+    if not found:
+        found = _by_encoders(measured, signs, errors, worn_wheel_of_mesh)
+        # What two encoders see of unlike wheels is the better witness, also of sound ones.
+        heard = [one for one in signs if not _is_compared(measured, one, errors)]
+        found = found or _wear(measured, heard)
     found += _off_axis(measured)
     return tuple(found)
+
+
+def _is_compared(measured: Measured, signs: ShaftSigns, errors: Mapping[str, tuple[ToothError, ...]]) -> bool:
+    """True where encoders told the unevenness of this wheel beside that of its mate."""
+    mesh = wheel_name(measured, signs.ratio, signs.teeth)[1]
+    return bool(errors[mesh.name]) and mesh.driving_teeth != mesh.driven_teeth
+
+
+def _by_encoders(
+    measured: Measured,
+    signs: list[ShaftSigns],
+    errors: Mapping[str, tuple[ToothError, ...]],
+    judge: Callable[[Measured, GearMesh, tuple[ToothError, ...], str], Finding | None],
+) -> list[Finding]:
+    """What a judge of transmission errors finds in the meshes that have any."""
+    channel = signs[0].best.channel if signs else next(iter(measured.channels), "")
+    meshes = [mesh for mesh in measured.machine.gear_meshes if errors[mesh.name]]
+    return [one for mesh in meshes if (one := judge(measured, mesh, errors[mesh.name], channel))]
 
 
 def wheel_name(measured: Measured, ratio: float, teeth: int) -> tuple[str, GearMesh]:
@@ -116,12 +150,12 @@ def _bad_tooth(measured: Measured, signs: ShaftSigns) -> Finding:
     )
 
 
-def _wear(measured: Measured, signs: list[ShaftSigns], teeth: list[Finding]) -> list[Finding]:
+def _wear(measured: Measured, signs: list[ShaftSigns]) -> list[Finding]:
     """Both signs together: uneven teeth all round, and mesh harmonics that sound teeth do not have."""
     if measured.speed.source not in ("tacho", "encoder"):
         return []  # an angle read from the vibration smears the average, which looks like uneven teeth
     worst = max((one for one in signs if one.mesh_is_heard), key=_wear_size, default=None)
-    if worst is None or teeth or _wear_size(worst) < 1.0:
+    if worst is None or _wear_size(worst) < 1.0:
         return []
     component, _ = wheel_name(measured, worst.ratio, worst.teeth)
     features = {
@@ -148,9 +182,9 @@ def _wear(measured: Measured, signs: list[ShaftSigns], teeth: list[Finding]) -> 
 
 
 def _wear_size(signs: ShaftSigns) -> float:
-    """1 at the limit: the geometric mean of both signs over their limits, neither below half of its own."""
+    """1 at the limit: the geometric mean of both signs over their limits, neither far below its own."""
     spread, harmonics = signs.spread / _WEAR_SPREAD, signs.harmonics / _WEAR_HARMONICS
-    return math.sqrt(spread * harmonics) if min(spread, harmonics) >= 0.5 else 0.0
+    return math.sqrt(spread * harmonics) / _WEAR_MEAN if min(spread, harmonics) >= _WEAR_EACH else 0.0
 
 
 def _evidence(measured: Measured, signs: ShaftSigns, features: dict[str, float]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from gearsim_dsp.synchronous.signals import mesh_lines
 from gearsim_dsp.synchronous.tsa import Average
 from gearsim_io.nameplate import Machine
 
-__all__ = ["ChannelSigns", "ShaftSigns", "shaft_signs"]
+__all__ = ["ChannelSigns", "ShaftSigns", "energy_by_angle", "shaft_signs", "standing_tooth"]
 
 Array = NDArray[np.float64]
 
@@ -187,7 +187,7 @@ def _signs(name: str, average: Average, regular: list[int], teeth: int) -> Chann
     noise = average.noise_rms * math.sqrt(share)
     mesh = np.array([math.sqrt(power[k * teeth]) if k * teeth < power.size else 0.0 for k in range(1, 9)])
     width = max(1, round(size / teeth))
-    profile = uniform_filter1d(difference**2, width, mode="wrap")
+    profile = energy_by_angle(difference, teeth)
     square = max(float(np.mean(difference**2)), _TINY)
     return ChannelSigns(
         name,
@@ -195,7 +195,7 @@ def _signs(name: str, average: Average, regular: list[int], teeth: int) -> Chann
         math.sqrt(square),
         noise,
         mesh,
-        np.asarray(profile),
+        profile,
         np.asarray(difference),
         np.asarray(uniform_filter1d(average.std**2, width, mode="wrap")) * (share / average.count),
         float(np.mean(difference**4)) / square**2,
@@ -211,7 +211,9 @@ def _combined(ratio: float, teeth: int, channels: tuple[ChannelSigns, ...], coun
     # In units of the profiles' medians, as the profiles are.
     noise = {one.channel: one.noise_rms**2 / max(float(np.median(one.profile)), _TINY) for one in channels}
     noise["together"] = float(np.median([noise[name] for name in hearing])) if hearing else 1.0
-    stands = {name: _stands(profile, teeth, min(1.0, noise[name])) for name, profile in profiles.items()}
+    stands = {
+        name: standing_tooth(profile, teeth, min(1.0, noise[name])) for name, profile in profiles.items()
+    }
     # Of single channels one in several stands out more by chance; together they are the surer witness.
     name = "together" if "together" in stands else max(stands, key=lambda key: stands[key][1])
     place, over_rest, over_median, chance = stands[name]
@@ -219,8 +221,28 @@ def _combined(ratio: float, teeth: int, channels: tuple[ChannelSigns, ...], coun
     return ShaftSigns(ratio, teeth, channels, place, over_rest, over_median, chance, best, count)
 
 
-def _stands(profile: Array, teeth: int, noise: float) -> tuple[float, float, float, float]:
-    """Place of the strongest tooth [turns], its energy over the next one's and the median, and the chance."""
+def energy_by_angle(signal: Array, teeth: int) -> Array:
+    """Mean square of one turn of a signal over a pitch around each angle."""
+    width = max(1, round(signal.size / teeth))
+    return np.asarray(uniform_filter1d(signal**2, width, mode="wrap"))
+
+
+def standing_tooth(profile: Array, teeth: int, noise: float) -> tuple[float, float, float, float]:
+    """Place of the strongest tooth [turns], its energy over the next one's and the median, and the chance.
+
+    Parameters
+    ----------
+    profile : ndarray, shape (n,)
+        Energy by angle, in units of its median.
+    teeth : int
+    noise : float
+        Part of it that is not the teeth's.
+
+    Returns
+    -------
+    tuple of float
+        The last one as the logarithm of the probability that teeth as uneven as the others give it.
+    """
     size = profile.size
     top = int(np.argmax(profile))
     away = np.abs((np.arange(size) - top + size // 2) % size - size // 2)

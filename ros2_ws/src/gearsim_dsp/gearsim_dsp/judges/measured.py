@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,22 @@ class Measured:
     def turns(self) -> float:
         """Turns of the reference shaft; 0 where the angle is not known."""
         return float(self.phase.turns[-1] - self.phase.turns[0]) if self.phase else 0.0
+
+    def last(self, share: float) -> Measured:
+        """The end of the stretch, `share` of it; encoders, which judges of this do not read, are left out."""
+        first = self.sample_count - round(share * self.sample_count)
+        channels = {name: values[first:] for name, values in self.channels.items()}
+        speed = self.speed
+        if self.phase is not None:
+            later = self.phase.samples > first
+            start = float(np.interp(first, self.phase.samples, self.phase.turns))
+            samples = np.concatenate(([0.0], self.phase.samples[later] - first))
+            phase = Phase(samples, np.concatenate(([start], self.phase.turns[later])))
+            value = (phase.turns[-1] - start) / samples[-1] * self.sample_rate_hz
+            scale = float(value) / speed.value_hz
+            low, high = speed.ci95_hz
+            speed = replace(speed, value_hz=float(value), ci95_hz=(scale * low, scale * high), phase=phase)
+        return Measured(self.machine, self.sample_rate_hz, self.unit, channels, speed)
 
     def average(self, channel: str, shaft_ratio: float, samples_per_turn: int) -> Average | None:
         """Synchronous average of a channel over one turn of a shaft; None with fewer than four turns."""

@@ -9,14 +9,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from gearsim_dsp.judges.measured import Measured
-from gearsim_dsp.speed import Phase
+from gearsim_dsp.judges.tooth_errors import encoder_phases
 from gearsim_io.nameplate import GearMesh
 
 __all__ = ["WheelRunout", "wheel_runout"]
 
 _LEAST_TURNS = 4
 _PER_TURN = 256
-_LEAST_LINES = 16.0  # of an encoder, below which it cannot say where within a turn the wheel is
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +46,10 @@ def wheel_runout(measured: Measured, mesh: GearMesh) -> WheelRunout | None:
     its teeth. A wheel e off its axis, with pitch radius r, lets it swing by e / (2 pi r) turns, or e / (pi m)
     pitches with the module m.
     """
-    driving = _phase(measured, mesh.driving_shaft)
-    driven = _phase(measured, mesh.driven_shaft)
-    if driving is None or driven is None:
+    phases = encoder_phases(measured, mesh)
+    if phases is None:
         return None
+    driving, driven = phases
     low = max(driving.samples[0], driven.samples[0])
     high = min(driving.samples[-1], driven.samples[-1])
     wheels = (
@@ -76,11 +75,3 @@ def wheel_runout(measured: Measured, mesh: GearMesh) -> WheelRunout | None:
     small = min(mesh.driving_teeth, mesh.driven_teeth)
     side = "" if twins else "pinion" if teeth == small else "gear"
     return WheelRunout(shaft, side, share, share / max(floor, 1e-12))
-
-
-def _phase(measured: Measured, shaft: str) -> Phase | None:
-    """Angle from the edges of an encoder; a tacho says nothing within the turn."""
-    train = measured.encoders.get(shaft)
-    if train is None or train.pulses_per_revolution < _LEAST_LINES or train.samples.size < 8:
-        return None
-    return Phase(train.samples, np.arange(train.samples.size) / train.pulses_per_revolution)

@@ -47,6 +47,8 @@ _MODERATE_MM_S, _SEVERE_MM_S = 4.5, 11.2
 _HARMONIC_SHARE = 0.35
 _LOOSE_ORDERS = 6
 _LOOSE_OVER_OTHERS = 2.0
+_END = 1 / 3
+_WORSE_DB = 3.0
 _SUPPLY_SHARE = 0.1  # of a tone's amplitude: with less of it left in an order, that order is the shaft's
 
 
@@ -107,9 +109,23 @@ class BearingLevels:
 
 
 def judge_shafts(measured: Measured) -> tuple[Finding, ...]:
-    """Findings on shafts and feet; none without an angle signal or where the unit is not m/s^2."""
+    """Findings on shafts and feet; none without an angle signal or where the unit is not m/s^2.
+
+    Faults grow: the last third of the record is judged as well, and where it is worse it counts.
+    """
     if measured.phase is None or measured.unit != "m/s^2":
         return ()
+    whole = _judged(measured)
+    end = _judged(measured.last(_END))
+    return end if _worst(end) > _worst(whole) + _WORSE_DB else whole
+
+
+def _worst(findings: tuple[Finding, ...]) -> float:
+    """In decibels over the limits; minus infinity where nothing was found."""
+    return max((one.snr_db for one in findings), default=-math.inf)
+
+
+def _judged(measured: Measured) -> tuple[Finding, ...]:
     levels = bearing_levels(measured)
     loose = _looseness(measured, levels)
     if loose:
