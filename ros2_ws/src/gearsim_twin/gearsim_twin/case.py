@@ -49,12 +49,12 @@ class Case:
         empty). All have the same channels and rate.
     split : bool
         True where the held-out records are the last third of the others, as none were given.
-    wholes : tuple of Record
-        The records before they were split; empty where they were not.
     modelled : Modelled
         What the model tells of the machine.
     remarks : tuple of str
         What was left out or taken as it comes, for people.
+    originals : tuple of Record
+        The records as they were given, for training, held out, healthy: not split, with all their channels.
     """
 
     machine: Machine
@@ -66,7 +66,7 @@ class Case:
     split: bool
     modelled: Modelled
     remarks: tuple[str, ...] = ()
-    wholes: tuple[Record, ...] = ()
+    originals: tuple[Record, ...] = ()
 
     @property
     def records(self) -> tuple[Record, ...]:
@@ -74,16 +74,15 @@ class Case:
         return (*self.training, *self.holdout, *self.healthy)
 
     def views(self) -> tuple[View, ...]:
-        """Each of `records` with its angle, which for the parts of a record is found over the whole."""
-        healthy = tuple(view_of(record, self.machine) for record in self.healthy)
-        if not self.split:
-            both = tuple(view_of(record, self.machine) for record in (*self.training, *self.holdout))
-            return (*both, *healthy)
-        wholes = [view_of(record, self.machine) for record in self.wholes]
-        ends = [record.sample_count for record in self.training]
-        training = tuple(view.part(0, end) for view, end in zip(wholes, ends, strict=True))
-        held = (view.part(end, view.record.sample_count) for view, end in zip(wholes, ends, strict=True))
-        return (*training, *held, *healthy)
+        """Each of `records` with its angle, which is found over the whole record and by all its channels."""
+        views = [view_of(record, self.machine) for record in self.originals]
+        if self.split:
+            wholes, healthy = views[: len(self.training)], views[len(self.training) :]
+            ends = [record.sample_count for record in self.training]
+            first = [view.part(0, end) for view, end in zip(wholes, ends, strict=True)]
+            last = [view.part(end, view.record.sample_count) for view, end in zip(wholes, ends, strict=True)]
+            views = [*first, *last, *healthy]
+        return tuple(view.only(self.channels) for view in views)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -135,7 +134,7 @@ def load_case(
     path = machine_file(machine)
     plate = load_machine(path)
     modelled = describe(path, model)
-    groups = {"MEASURED": measured, "--healthy": healthy, "--holdout": holdout}
+    groups = {"MEASURED": measured, "--holdout": holdout, "--healthy": healthy}
     _check_files(groups)
     read = {
         option: tuple(_read(Path(one), path, overrides) for one in files) for option, files in groups.items()
@@ -168,24 +167,24 @@ def make_case(
         each other, a record is too short, or one recording stands in two places.
     """
     modelled = modelled or describe(machine_path, model)
-    groups = {"MEASURED": tuple(measured), "--healthy": tuple(healthy), "--holdout": tuple(holdout)}
+    groups = {"MEASURED": tuple(measured), "--holdout": tuple(holdout), "--healthy": tuple(healthy)}
     if not groups["MEASURED"]:
         raise InputError("twin", "MEASURED", "no record", "at least one bag or measured file")
     remarks: list[str] = []
     groups = _one_rate(groups, remarks)
     groups = _one_unit(groups, remarks)
+    originals = tuple(record for records in groups.values() for record in records)
     groups = _one_set_of_channels(groups, machine, modelled, model, remarks)
     _check_distinct(groups)
     training, held = groups["MEASURED"], groups["--holdout"]
-    wholes: tuple[Record, ...] = ()
+    split = not held
     if held:
         for record in (*training, *held):
             _check_length(record, machine, 1)
     else:
         for record in training:
             _check_length(record, machine, _HELD_OUT_SHARE)
-        wholes = training
-        training, held = tuple(_split(one)[0] for one in wholes), tuple(_split(one)[1] for one in wholes)
+        training, held = zip(*(_split(record) for record in training), strict=True)
         remarks.append("no held-out record was given: the last third of each record is held out")
     for record in groups["--healthy"]:
         _check_length(record, machine, 1)
@@ -196,10 +195,10 @@ def make_case(
         training=training,
         holdout=held,
         healthy=groups["--healthy"],
-        split=bool(wholes),
+        split=split,
         modelled=modelled,
         remarks=tuple(remarks),
-        wholes=wholes,
+        originals=originals,
     )
 
 

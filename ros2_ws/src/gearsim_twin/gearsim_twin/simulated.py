@@ -104,7 +104,13 @@ class Simulator:
         InputError
             If the simulator refuses a content, naming its key.
         """
-        return self.derived(list(content_of.items()), _itself, seconds, seed)
+        tasks = [self._task(number, content, seconds, seed) for number, content in content_of.items()]
+        found = {task.key: self._kept[task.key] for task in tasks if task.key in self._kept}
+        missing = {task.key: task for task in tasks if task.key not in found}
+        found.update(zip(missing, self._made(list(missing.values()), _itself), strict=True))
+        for key, view in found.items():
+            self._keep(key, view)
+        return [found[task.key] for task in tasks]
 
     def derived(
         self,
@@ -118,38 +124,41 @@ class Simulator:
         With several workers it is called where the simulation ran, and must be picklable: a function of a
         module, or `functools.partial` of one. Parameters and errors as for `views`.
         """
-        tasks = [self._task(number, content, seconds, seed) for number, content in jobs]
-        if self._workers == 1 or len(tasks) < 2:
-            return [then(self._view(task)) for task in tasks]
-        if self._pool is None:
-            self._pool = Workers(self._workers)
-        try:
-            return self._pool.map(_done, [(task, then) for task in tasks])
-        except WorkerLostError:
-            # A process was killed from outside; what it can do this one can.
-            self.close()
-            self._workers = 1
-            return [then(self._view(task)) for task in tasks]
-        except BaseException:
-            self.close()
-            raise
+        return self._made([self._task(number, content, seconds, seed) for number, content in jobs], then)
 
     def _task(self, number: int, content: Content, seconds: float | None, seed: int) -> _Task:
         view = self.measured[number]
         length = view.record.seconds if seconds is None else seconds
-        return _Task({**copy.deepcopy(dict(content)), "seed": seed}, length, view.machine, view.speed)
+        own = {**copy.deepcopy(dict(content)), "seed": seed}
+        shafts = self.case.modelled.tacho_shafts
+        shaft = view.machine.reference_shaft if view.machine.reference_shaft in shafts else shafts[0]
+        return _Task(own, length, view.machine, view.speed, shaft)
+
+    def _made(self, tasks: Sequence[_Task], then: Callable[[View], T]) -> list[T]:
+        if self._workers > 1 and len(tasks) > 1:
+            try:
+                self._pool = self._pool or Workers(self._workers)
+                return self._pool.map(_done, [(task, then) for task in tasks])
+            except WorkerLostError:
+                # A process was killed from outside; what it can do this one can, one after the other.
+                self.close()
+                self._workers = 1
+            except BaseException:
+                self.close()
+                raise
+        return [then(self._view(task)) for task in tasks]
 
     def _view(self, task: _Task) -> View:
-        key = task.key
-        if key in self._kept:
-            self._kept.move_to_end(key)
-            return self._kept[key]
-        view = self._kept[key] = task.view()
-        while (
-            len(self._kept) > 1 and sum(one.record.data.nbytes for one in self._kept.values()) > _MOST_BYTES
-        ):
-            self._kept.popitem(last=False)
+        view = self._kept[task.key] if task.key in self._kept else task.view()
+        self._keep(task.key, view)
         return view
+
+    def _keep(self, key: str, view: View) -> None:
+        """Keep a view, and drop those that were not asked for the longest."""
+        self._kept[key] = view
+        self._kept.move_to_end(key)
+        while len(self._kept) > 1 and sum(v.record.data.nbytes for v in self._kept.values()) > _MOST_BYTES:
+            self._kept.popitem(last=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,6 +169,7 @@ class _Task:
     seconds: float
     machine: Machine
     measured: ShaftSpeed
+    angle_shaft: str
 
     @property
     def key(self) -> str:
@@ -169,8 +179,8 @@ class _Task:
 
     def view(self) -> View:
         """The simulated record over the measured one's kind of angle."""
-        own = self.measured.source in ("tacho", "encoder")
-        content = self.content if own else _with_reference_tacho(self.content, self.machine)
+        own = self.measured.source in ("tacho", "encoder") and _has_angle_signals(self.content)
+        content = self.content if own else _with_tacho(self.content, self.angle_shaft)
         scenario = parse_scenario(content, _SOURCE)
         record = replace(to_record(scenario, self.seconds, between=check_stop), machine=self.machine.name)
         speed = self._own_speed(record) if own else self._assumed_speed(record)
@@ -198,10 +208,15 @@ class _Task:
         return replace(self.measured, phase=phase)
 
 
-def _with_reference_tacho(content: dict[str, Any], machine: Machine) -> dict[str, Any]:
-    """With one clean pulse per turn of the reference shaft: angles found in vibration are as smooth."""
-    changed = copy.deepcopy(content)
-    changed.setdefault("sensors", {})["tachos"] = {"shafts": [machine.reference_shaft], "pulses": 1}
+def _has_angle_signals(content: Content) -> bool:
+    sensors = content.get("sensors", {})
+    return any(sensors.get(kind, {}).get("shafts") for kind in ("tachos", "encoders"))
+
+
+def _with_tacho(content: Content, shaft: str) -> dict[str, Any]:
+    """With one clean pulse per turn of a shaft: angles found in vibration are as smooth."""
+    changed = copy.deepcopy(dict(content))
+    changed.setdefault("sensors", {})["tachos"] = {"shafts": [shaft], "pulses": 1}
     return changed
 
 

@@ -7,6 +7,7 @@ samples to features does wrong it does wrong on both sides.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
 from gearsim_twin.load import stated_load_nm
-from gearsim_twin.recordings import cut
+from gearsim_twin.recordings import cut, only
 
 __all__ = ["View", "view_of"]
 
@@ -114,6 +115,11 @@ class View:
         last = min(edges[-1], float(self.phase.samples[-1]) / self.record.sample_rate_hz)
         edges[-1] = max(last, edges[-2] + 1.0 / self.record.sample_rate_hz)
         return middles, np.diff(turns) / np.diff(edges)
+
+    def only(self, channels: Sequence[str]) -> View:
+        """The view of these channels alone, in this order."""
+        issues = tuple(one for one in self.issues if not one.channel or one.channel in channels)
+        return View(only(self.record, channels), self.machine, self.speed, self.load_nm, issues)
 
     def part(self, first: int, end: int) -> View:
         """The view of samples `first` to `end` (not included), with the angle found over the whole."""
