@@ -88,3 +88,44 @@ def test_simulated_stages_of_table_7_7(number):
     if case.truths:
         wanted = 32 if case.truths[0].fault == "planet_tooth_crack" else 16
         assert findings[0].evidence["impulses_per_4_carrier_turns"] == wanted
+
+
+def pushed_stage(number, seconds=6.0):
+    """Blows of a tooth of planet `number`, in lines 120 degrees apart, heard by a sensor that stands."""
+    samples = round(seconds * RATE_HZ)
+    t = np.arange(samples) / RATE_HZ
+    since = np.mod(t - 0.3 * PLANET_TURN_S, PLANET_TURN_S)
+    blow = 0.5 * np.exp(-(((since - 1.5e-3) / 0.5e-3) ** 2)) * np.cos(2 * np.pi * 2500.0 * since)
+    heard = np.cos(2 * np.pi * (CARRIER_HZ * t - number / 3 - 0.1))
+    return blow * heard + 0.05 * np.random.default_rng(number).standard_normal(samples)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_planets_differ_in_where_the_carrier_stands_when_they_push_the_ring(number):
+    machine = planetary()
+    (finding,) = judge_planets(measured(machine, {"ring": pushed_stage(number)}, steady(CARRIER_HZ, 6.0)))
+    turn = finding.evidence["carrier_turn_of_push"]
+    assert np.mod(turn - number / 3 - 0.1 + 0.25, 0.5) == pytest.approx(0.25, abs=0.02)
+    assert f"{turn:.2f}" in finding.evidence["which_planet"]
+
+
+def test_averaged_turns_find_what_single_turns_bury_in_noise():
+    """The same tooth at a noise in which the residual shows nothing, and none without the tooth."""
+    machine, speed = planetary(), steady(CARRIER_HZ, 12.0)
+    tooth = pushed_stage(0, 12.0)
+    for seed in range(3):
+        noise = 0.3 * np.random.default_rng(seed).standard_normal(tooth.size)
+        (finding,) = judge_planets(measured(machine, {"ring": tooth + noise}, speed))
+        assert finding.evidence["stands_out_of"] == "turns averaged with the carrier"
+        assert finding.fault == "planet_tooth_spall"
+        assert judge_planets(measured(machine, {"ring": noise}, speed)) == ()
+        folded = fold_stage(measured(machine, {"ring": tooth + noise}, speed), machine.planetary_stages[0])
+        assert not find_impulses(folded[0].profile).stands_out()
+
+
+def test_one_knock_is_no_tooth():
+    """Loud, but in one half of the record only."""
+    machine, speed = planetary(), steady(CARRIER_HZ, 6.0)
+    x = 0.05 * np.random.default_rng(1).standard_normal(round(6 * RATE_HZ))
+    x += ring_down([2.03], 6.0, 20.0)
+    assert judge_planets(measured(machine, {"ring": x}, speed)) == ()

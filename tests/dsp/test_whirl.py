@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearsim_dsp.speed import Phase
-from gearsim_dsp.synchronous.whirl import blow_of_tooth, unlike_the_rest, whirl_parts
+from gearsim_dsp.synchronous.whirl import blow_of_tooth, push_of_tooth, unlike_the_rest, whirl_parts
 
 RATE_HZ, CARRIER_HZ, TEETH, RING = 16384.0, 3.0, 20, 80
 BAND = (2000.0, 3000.0)
@@ -95,6 +95,17 @@ def test_a_sensor_on_the_carrier_has_one_part():
     assert parts.shape == (1, 1, TEETH * 16)
     blow = blow_of_tooth(parts, TEETH, PLACE)
     assert blow.energy[0, 0] > 100 * blow.floor[0, 0]
+
+
+@pytest.mark.parametrize("turn", [0.1, 0.37, 0.5])
+def test_the_line_of_a_straight_motion(turn):
+    """Forward and backward alike: heard most where the carrier's angle is half of what lies between them."""
+    angle = 2 * np.pi * turn
+    parts = parts_of(standing_sensor(np.exp(-1j * angle), np.exp(1j * angle), noise=0.05))
+    told, straight = push_of_tooth(parts, TEETH, PLACE)
+    assert np.mod(told - turn + 0.25, 0.5) == pytest.approx(0.25, abs=0.003)
+    assert straight > 0.98
+    assert push_of_tooth(parts_of(standing_sensor(1.0, 0.0)), TEETH, PLACE)[1] < 0.1
 
 
 def test_two_bad_teeth_stand_out_of_what_all_share():

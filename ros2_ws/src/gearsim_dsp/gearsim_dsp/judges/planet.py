@@ -11,7 +11,7 @@ differs from turn to turn, as a tooth that now and then goes unloaded, is seen i
 of a linear prediction, whose length is that of the most impulsive residual, at most a quarter of the
 impulses' spacing (thesis 7.8.2), folded over the turn::
 
-    P(u) = mean over turns k of E(k + u), over its median,
+    P(u) = mean over turns k, but the loudest, of E(k + u), over its median,
 
 which adds up what a single sensor hears of each pass, near or far. One tooth that stands out is a spall, two
 half a turn (less or more half a tooth pitch) apart are a crack. Of averaged turns a pair has to be clear: a
@@ -33,6 +33,7 @@ from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.planet_side import spall_side
 from gearsim_dsp.judges.planet_turns import averaged_profile, averaged_turns
 from gearsim_dsp.separation.linear_prediction import ar_residual, best_ar_length, longest_ar_length
+from gearsim_dsp.synchronous.whirl import push_of_tooth
 from gearsim_io.nameplate import PlanetaryStage
 
 __all__ = ["FoldedResidual", "ToothImpulses", "fold_stage", "judge_planets"]
@@ -57,6 +58,7 @@ _LEAST_RATIO_AVERAGED = 5.0
 _LEAST_DEVIATIONS_AVERAGED = 5.0
 _PAIR_OVER_REST_AVERAGED = 1.75
 _TOGETHER = "all channels"
+_LEAST_STRAIGHT = 0.5
 _SEVERE, _MODERATE = 30.0, 5.0
 
 
@@ -84,8 +86,8 @@ class FoldedResidual:
 
     @property
     def profile(self) -> Array:
-        """Mean over the turns, over its median."""
-        mean = self.energy.mean(axis=0)
+        """Mean over the turns but the loudest one, which may be a knock, over its median."""
+        mean = (self.energy.sum(axis=0) - self.energy.max(axis=0)) / (self.energy.shape[0] - 1)
         return np.asarray(mean / max(float(np.median(mean)), np.finfo(np.float64).tiny))
 
 
@@ -220,6 +222,7 @@ def _judge(measured: Measured, stage: PlanetaryStage, folded: list[FoldedResidua
     pair = max(one.pair / one.rest for one, _ in own)
     tooth = _Tooth(clearest, crack, together is not None, pair)
     finding = _finding(measured, stage, folded, single, tooth)
+    finding.evidence.update(_which_planet(measured, stage, turns.get("ring"), clearest.place / bins))
     if not crack:
         finding.evidence.update(spall_side(turns, stage.planet_teeth, clearest.place / bins))
     return finding
@@ -233,6 +236,27 @@ class _Tooth:
     is_crack: bool
     is_averaged: bool
     pair_over_rest: float
+
+
+def _which_planet(
+    measured: Measured, stage: PlanetaryStage, ring: NDArray[np.complex128] | None, place: float
+) -> dict[str, object]:
+    """What one needs at the machine to find the planet, which no nameplate tells: the carrier's place.
+
+    The ring moves along the line of action of the planet's mesh with it, whichever flank is bad; where that
+    is the axis of the ring's sensor, the planet stands a pressure angle from square to it.
+    """
+    unknown = "not told: the nameplate does not say where the planets stand at the tacho's pulse"
+    tacho = measured.speed.source == "tacho" and measured.machine.reference_shaft == stage.carrier_shaft
+    if ring is None or ring.shape[2] < 3 or not tacho:
+        return {"which_planet": unknown}
+    turn, straight = push_of_tooth(ring.mean(axis=0), stage.planet_teeth, place)
+    if straight < _LEAST_STRAIGHT:
+        return {"which_planet": unknown}
+    where = (
+        f"its tooth pushes the ring along the ring's sensor {turn:.2f} and {turn + 0.5:.2f} turns after it"
+    )
+    return {"which_planet": f"{unknown}; {where}", "carrier_turn_of_push": round(turn, 4)}
 
 
 def _impulses(profiles: dict[str, Array], near_teeth: float) -> dict[str, ToothImpulses]:
@@ -291,7 +315,6 @@ def _finding(
         "stands_out_of": "turns averaged with the carrier" if tooth.is_averaged else "energy of single turns",
         "tooth_over_others_db": 10 * math.log10(clearest.peak / clearest.rest),
         "planet_turns": int(best.energy.shape[0]),
-        "which_planet": "not told: no sensor marks one of the planets",
         "speed_source": measured.speed.source,
         "frequency_hz": order * measured.speed.value_hz,
         "features": features,

@@ -29,7 +29,7 @@ from scipy import fft as sfft
 
 from gearsim_dsp.speed import Phase
 
-__all__ = ["BINS_PER_TOOTH", "ToothBlow", "blow_of_tooth", "unlike_the_rest", "whirl_parts"]
+__all__ = ["BINS_PER_TOOTH", "ToothBlow", "blow_of_tooth", "push_of_tooth", "unlike_the_rest", "whirl_parts"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -154,6 +154,37 @@ def blow_of_tooth(parts: Complexes, teeth: int, place: float) -> ToothBlow:
     quiet = square[..., others] / seen * unseen
     windows = np.lib.stride_tricks.sliding_window_view(quiet, size, axis=-1).mean(axis=-1)
     return ToothBlow(square[..., :size].mean(axis=-1), quiet.mean(axis=-1), windows.std(axis=-1))
+
+
+def push_of_tooth(parts: Complexes, teeth: int, place: float) -> tuple[float, float]:
+    """Where the carrier stands when a tooth's blow moves the wheel to and fro along the sensor's axis.
+
+    A motion along one line is a forward and a backward whirl of one size; the line's direction is half the
+    angle between them, so it is known up to half a turn.
+
+    Parameters
+    ----------
+    parts : ndarray of complex, shape (bands, 3, teeth * 16)
+        Of `whirl_parts`, of one half of the record or their mean.
+    teeth : int
+    place : float
+        Where the tooth strikes, in turns of the planet.
+
+    Returns
+    -------
+    turn : float
+        Of the carrier, 0 to 0.5.
+    straightness : float
+        1 for a motion along one line, 0 for a circle or for bands that disagree.
+    """
+    bins = parts.shape[-1]
+    begin = round((place - _BEFORE_TEETH / teeth) * bins)
+    window = np.roll(unlike_the_rest(parts, teeth), -begin, axis=-1)[..., : _WINDOW_TEETH * BINS_PER_TOOTH]
+    forward, backward = window[..., 0, :], window[..., 1, :]
+    product = complex(np.sum(np.conj(forward) * backward))
+    power = 0.5 * float(np.sum(np.abs(forward) ** 2 + np.abs(backward) ** 2))
+    turn = float(np.mod(np.angle(product) / (4.0 * math.pi), 0.5))
+    return turn, abs(product) / power if power > 0 else 0.0
 
 
 def unlike_the_rest(parts: Complexes, teeth: int) -> Complexes:
