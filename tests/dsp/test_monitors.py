@@ -15,6 +15,7 @@ from rig_stream import BPFI_ORDER, BPFO_ORDER, RATE_HZ, cut, interleave, machine
 from gearsim_dsp.alarms import AlarmSettings
 from gearsim_dsp.judges.bearing import MODULATION_LIMIT, find_faults
 from gearsim_dsp.results import Level
+from gearsim_dsp.streams import assembler
 from gearsim_dsp.streams.assembler import WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings, indications
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
@@ -119,6 +120,20 @@ def test_windows_that_are_pooled_are_analysed_alike_but_not_judged():
         for a, b in zip(one.results, other.results, strict=True):
             assert [s.power.tobytes() for s in a.spectra] == [s.power.tobytes() for s in b.spectra]
     assert not find_faults(machine(), monitor._pool).evidence
+
+
+def test_monitors_that_share_a_window_share_its_spectra(monkeypatch):
+    made = []
+    real = assembler.both_spectra
+    monkeypatch.setattr(assembler, "both_spectra", lambda *given: made.append(given) or real(*given))
+    windows = assembler.WindowAssembler(machine(), EnvelopeSettings().window)
+    window = next(w for batch in faulty().batches(512) for w in windows.push(batch))
+    found = [monitor(machine()).judge(window) for monitor in (EnvelopeMonitor, KurtosisMonitor)]
+    assert len(made) == len(window.channels)
+    alone = [
+        outcomes(faulty().batches(512), m(machine()))[0].report for m in (EnvelopeMonitor, KurtosisMonitor)
+    ]
+    assert [report.features for report in found] == [report.features for report in alone]
 
 
 def test_features_and_spectra_say_where_they_come_from():

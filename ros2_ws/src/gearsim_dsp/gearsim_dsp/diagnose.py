@@ -8,6 +8,7 @@ evidence.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.quality import QualityIssue, check_levels
 from gearsim_dsp.remarks import record_remarks, what_is_lacking
 from gearsim_dsp.speed import ShaftSpeed
-from gearsim_dsp.streams.assembler import WindowSettings
+from gearsim_dsp.streams.assembler import Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
 from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor, KurtosisSettings
 from gearsim_dsp.streams.report import Report
@@ -173,22 +174,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         raise InputError(record.source or "record", "channels", ", ".join(record.channels), expected)
     window = _window(record, plate, settings)
     angle = record_speed(record, plate)
-    speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
-    if angle.replaces_angle and angle.speed is not None:
-        speeds = KnownSpeeds(angle.speed, record.first_sample)
-    settled = EnvelopeSettings(window, size_every=0, between=True)
-    envelope = EnvelopeMonitor(plate, settled, speeds=speeds, by_window=False)
-    kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
-    pool = EvidencePool(plate)
-    reports: list[Report] = []
-    impulsive: list[Report] = []
-    for batch in record.batches(settings.batch_samples):
-        if isinstance(batch, TorqueBatch):
-            continue
-        reports += _pooled(envelope.push(batch), pool)
-        impulsive += kurtosis.push(batch)
-    reports += _pooled(envelope.finish(), pool)
-    impulsive += kurtosis.finish()
+    pool, reports, impulsive = _by_windows(record, plate, angle, window, settings.batch_samples)
     verdict = find_faults(plate, pool)
     notes = _quality(record, plate, verdict, reports)
     speed = angle.speed or verdict.speed
@@ -218,6 +204,36 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     )
 
 
+def _by_windows(
+    record: Record, plate: Machine, angle: RecordSpeed, window: WindowSettings, batch_samples: int
+) -> tuple[EvidencePool, list[Report], list[Report]]:
+    """Evidence of all windows together, and the reports of the envelope and the kurtosis monitor on each."""
+    speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
+    if angle.replaces_angle and angle.speed is not None:
+        speeds = KnownSpeeds(angle.speed, record.first_sample)
+    settings = EnvelopeSettings(window, size_every=0, between=True)
+    envelope = EnvelopeMonitor(plate, settings, speeds=speeds, by_window=False)
+    kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
+    pool = EvidencePool(plate)
+    reports: list[Report] = []
+    impulsive: list[Report] = []
+    for one in _windows(record, plate, window, batch_samples):
+        report = envelope.judge(one)
+        pool.add(report.results)
+        reports.append(replace(report, results=()))  # or memory would grow with the record
+        impulsive.append(kurtosis.judge(one))
+    return pool, reports, impulsive
+
+
+def _windows(record: Record, plate: Machine, window: WindowSettings, batch_samples: int) -> Iterator[Window]:
+    """The windows that a live stream of the record would be cut into, one set for all monitors."""
+    assembler = WindowAssembler(plate, window)
+    for batch in record.batches(batch_samples):
+        if not isinstance(batch, TorqueBatch):
+            yield from assembler.push(batch)
+    yield from assembler.finish()
+
+
 def _judged_parts(measured: Measured, verdict: Verdict) -> tuple[str, ...]:
     """Kinds of parts that were looked at; what needs the angle is looked at only where that is known."""
     machine = measured.machine
@@ -227,12 +243,6 @@ def _judged_parts(measured: Measured, verdict: Verdict) -> tuple[str, ...]:
         parts += ["planets"] if machine.planetary_stages else []
         parts += ["shafts"] if machine.bearings and measured.unit == "m/s^2" else []
     return tuple(parts)
-
-
-def _pooled(reports: list[Report], pool: EvidencePool) -> list[Report]:
-    for report in reports:
-        pool.add(report.results)
-    return reports
 
 
 def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> WindowSettings:

@@ -28,6 +28,7 @@ from gearsim_io.errors import InputError
 __all__ = [
     "Envelopes",
     "WindowSpectrum",
+    "both_spectra",
     "envelope_spectrum",
     "order_spectrum",
     "squared_envelopes",
@@ -91,6 +92,14 @@ def suppress_lines(spectrum: WindowSpectrum, limit: float = _LINE_LIMIT) -> Wind
     bound = limit * np.maximum(local, np.finfo(np.float32).tiny)
     factor = np.minimum(np.float32(1), bound / np.maximum(magnitude, np.finfo(np.float32).tiny))
     return replace(spectrum, lines=spectrum.lines * factor.astype(np.float32))
+
+
+def both_spectra(
+    samples: NDArray[np.float32] | NDArray[np.float64], sample_rate_hz: float
+) -> tuple[WindowSpectrum, WindowSpectrum]:
+    """The spectrum of a window, and the same with its lines limited (`suppress_lines`)."""
+    spectrum = window_spectrum(samples, sample_rate_hz)
+    return spectrum, suppress_lines(spectrum)
 
 
 @lru_cache(maxsize=8)

@@ -10,6 +10,7 @@ A monitor that streams windows works like this::
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +20,9 @@ from gearsim_dsp.bands import Band, BandPlan, plan_bands
 from gearsim_dsp.envelope import (
     Envelopes,
     WindowSpectrum,
+    both_spectra,
     order_spectrum,
     squared_envelopes,
-    suppress_lines,
-    window_spectrum,
 )
 from gearsim_dsp.quality import QualityIssue, check_samples
 from gearsim_dsp.speed import Phase, ShaftSpeed
@@ -52,6 +52,8 @@ class WindowInput:
         Bands to demodulate beside the bank of `bands.plan_bands`, such as one given or the kurtogram's.
     between : bool
         Demodulate the bands centred on the borders of the bank's, too.
+    spectra : callable, optional
+        Gives `envelope.both_spectra` of the samples where others need them as well.
     """
 
     samples: NDArray[np.float32] | NDArray[np.float64]
@@ -62,6 +64,7 @@ class WindowInput:
     machine: Machine
     bands: tuple[Band, ...] = ()
     between: bool = False
+    spectra: Callable[[], tuple[WindowSpectrum, WindowSpectrum]] | None = None
 
     def __post_init__(self) -> None:
         where = f"channel {self.channel!r}"
@@ -153,10 +156,11 @@ def analyse_window(window: WindowInput) -> WindowResult:
     low: LowSpectrum | None = None
     turns = float("nan")
     if not any(issue.fatal for issue in issues):
-        spectrum = window_spectrum(window.samples, window.sample_rate_hz)
+        made = window.spectra() if window.spectra else both_spectra(window.samples, window.sample_rate_hz)
+        spectrum, clean = made
         low = _low_spectrum(spectrum)
         if plan is not None:
-            spectra, turns = _spectra(spectrum, window, plan)
+            spectra, turns = _spectra(clean, window, plan)
     return WindowResult(
         window.channel,
         window.first_sample,
@@ -182,9 +186,8 @@ def _low_spectrum(spectrum: WindowSpectrum) -> LowSpectrum:
 
 
 def _spectra(
-    spectrum: WindowSpectrum, window: WindowInput, plan: BandPlan
+    clean: WindowSpectrum, window: WindowInput, plan: BandPlan
 ) -> tuple[tuple[BandSpectrum, ...], float]:
-    clean = suppress_lines(spectrum)
     phase = window.speed.phase or _steady_phase(window)
     bands = [*plan.bank, *(plan.between if window.between else ())]
     envelopes = [squared_envelopes(clean, np.array([b.low_hz for b in bands]), plan.width_hz)]

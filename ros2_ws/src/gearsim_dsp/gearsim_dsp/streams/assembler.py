@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_dsp.envelope import WindowSpectrum, both_spectra
 from gearsim_dsp.streams.angle_track import AngleTrack, as_pulses
 from gearsim_dsp.streams.ring import SignalBuffer
 from gearsim_dsp.streams.sequencer import Link, Sequenced, Sequencer
@@ -73,6 +74,13 @@ class Window:
     pulses: tuple[PulseTrain, ...]
     run: int
     note: str = ""
+    _spectra: dict[int, tuple[WindowSpectrum, WindowSpectrum]] = field(default_factory=dict, repr=False)
+
+    def spectra(self, row: int) -> tuple[WindowSpectrum, WindowSpectrum]:
+        """Spectrum of a channel, and without its lines: made once for all monitors that look at it."""
+        if row not in self._spectra:
+            self._spectra[row] = both_spectra(self.data[row], self.sample_rate_hz)
+        return self._spectra[row]
 
     @property
     def sample_count(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -180,6 +181,7 @@ class EnvelopeMonitor(WindowedMonitor):
                 machine=self.machine,
                 bands=() if band is None else (band,),
                 between=self.settings.between,
+                spectra=partial(window.spectra, row),
             )
         )
 

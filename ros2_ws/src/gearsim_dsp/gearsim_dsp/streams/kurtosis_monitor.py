@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsim_dsp.alarms import Indication
 from gearsim_dsp.bands import TOP_SHARE, Band
-from gearsim_dsp.envelope import squared_envelopes, suppress_lines, window_spectrum
+from gearsim_dsp.envelope import squared_envelopes
 from gearsim_dsp.features import crest_factor, kurtosis, rms
 from gearsim_dsp.impulsiveness import FULL_MODULATION_KURTOSIS, impulsiveness
 from gearsim_dsp.quality import QualityIssue, check_samples
@@ -120,7 +120,7 @@ class KurtosisMonitor(WindowedMonitor):
     def _channel(self, window: Window, row: int, speed: ShaftSpeed) -> _Channel:
         samples = window.data[row]
         bands = self._bands(window.sample_rate_hz)
-        spectrum = suppress_lines(window_spectrum(samples, window.sample_rate_hz))
+        _, spectrum = window.spectra(row)
         lows = np.array([band.low_hz for band in bands])
         envelopes = squared_envelopes(spectrum, lows, bands[0].high_hz - bands[0].low_hz)
         found = impulsiveness(envelopes.values, self._blocks(window, speed, envelopes.values.shape[1]))

@@ -44,13 +44,14 @@ class WindowedMonitor(ABC):
 
     def push(self, batch: Batch) -> list[Report]:
         """Take one batch, in any interleaving; return the reports of the windows that are complete now."""
-        return [self._next(window) for window in self.assembler.push(batch)]
+        return [self.judge(window) for window in self.assembler.push(batch)]
 
     def finish(self) -> list[Report]:
         """The end of the input: reports of the windows that still waited for something."""
-        return [self._next(window) for window in self.assembler.finish()]
+        return [self.judge(window) for window in self.assembler.finish()]
 
-    def _next(self, window: Window) -> Report:
+    def judge(self, window: Window) -> Report:
+        """The report of one window, made by this monitor's assembler or by one that several share."""
         if window.run != self._run:
             self._run = window.run
             self._restart()
