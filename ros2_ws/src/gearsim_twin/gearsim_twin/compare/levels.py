@@ -1,0 +1,89 @@
+"""What a representation hands out: levels at its places, how sure, and how nuisances would act on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_io.errors import InputError
+
+__all__ = ["Levels", "joined", "nothing"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Levels:
+    """Levels at places; all arrays float64 of shape (n,), read-only.
+
+    Attributes
+    ----------
+    level_db : ndarray
+        NaN where the place says nothing in this record.
+    std_db : ndarray
+        Sampling standard deviation; infinite where the place says nothing.
+    height_db, clear_db : ndarray
+        Height over what noise alone would give, and the height that noise hardly reaches; infinite and 0
+        where there is no such thing as noise alone (bands, statistics).
+    frequency_hz, bandwidth_hz : ndarray
+        Of power: where it lies, and the noise bandwidth it takes in; NaN for what is no power.
+    gauss_db : ndarray
+        Of modulations and statistics: level of stationary Gaussian noise; NaN for what noise leaves alone.
+    """
+
+    level_db: Vector
+    std_db: Vector
+    height_db: Vector
+    clear_db: Vector
+    frequency_hz: Vector
+    bandwidth_hz: Vector
+    gauss_db: Vector
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            array = getattr(self, entry.name)
+            if array.shape != self.level_db.shape or array.ndim != 1:
+                raise InputError("Levels", entry.name, array.shape, f"shape {self.level_db.shape}")
+            array.flags.writeable = False
+
+    @classmethod
+    def of(
+        cls,
+        level_db: Vector,
+        std_db: Vector,
+        *,
+        height_db: Vector | None = None,
+        clear_db: Vector | None = None,
+        frequency_hz: Vector | None = None,
+        bandwidth_hz: Vector | None = None,
+        gauss_db: Vector | None = None,
+    ) -> Levels:
+        """Levels with what is left out filled in; where the level is not finite the place says nothing."""
+        level = np.array(level_db, dtype=np.float64)
+        said = np.isfinite(level) & np.isfinite(std_db)
+
+        def filled(array: Vector | None, value: float) -> Vector:
+            return np.full(level.size, value) if array is None else np.array(array, dtype=np.float64)
+
+        return cls(
+            np.where(said, level, np.nan),
+            np.where(said, std_db, np.inf),
+            np.where(said, filled(height_db, np.inf), np.nan),
+            filled(clear_db, 0.0),
+            filled(frequency_hz, np.nan),
+            filled(bandwidth_hz, np.nan),
+            filled(gauss_db, np.nan),
+        )
+
+
+def nothing(count: int) -> Levels:
+    """Levels that say nothing."""
+    return Levels.of(np.full(count, np.nan), np.full(count, np.inf))
+
+
+def joined(parts: Sequence[Levels]) -> Levels:
+    """Levels one after the other."""
+    return Levels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Levels)))

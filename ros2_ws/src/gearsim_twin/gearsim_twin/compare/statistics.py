@@ -1,0 +1,154 @@
+"""Domain statistics: levels and shapes of bands, and how steady the level is over the record.
+
+Kinds: rms (dB of the unit squared) and kurtosis of a band, and of the whole channel crest (peak over rms),
+asymmetry (mean square above over below zero), drift (change of the short-time level over the record),
+fluctuation (scatter of the short-time level, in dB of 0.2 dB), quiet and loud (extremes of it). Standard
+deviations are those of figures of parts of the record, left out in turn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_twin.compare.frame import Frame
+from gearsim_twin.compare.levels import Levels
+from gearsim_twin.compare.lines import DB, LEAST_STD_DB, jackknife
+from gearsim_twin.compare.material import Material
+from gearsim_twin.compare.places import Place
+
+__all__ = ["measure", "places"]
+
+_PARTS = 12
+_FIGURES = ("rms", "kurtosis", "crest", "asymmetry", "drift", "fluctuation", "quiet", "loud")
+_BLOCKS = 40
+_SCATTER_DB = 0.2
+_THEORY_PARTS = 4.0
+_GAUSS_KURTOSIS_DB = 10 * math.log10(3.0)
+_GAUSS_BAND_DB = 10 * math.log10(2.0)
+
+
+def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
+    """The figures of every channel."""
+    del materials
+    found: list[Place] = []
+    for channel in frame.channels:
+        for kind in _FIGURES:
+            found.append(Place("statistics", channel, kind, 0.0, "1", 1.0))
+        for band in frame.bands_hz:
+            middle = math.sqrt(band[0] * band[1])
+            for kind in ("rms", "kurtosis"):
+                found.append(Place("statistics", channel, kind, middle, "Hz", band[1] - band[0], "", band))
+    return found
+
+
+def measure(material: Material, wanted: Sequence[Place]) -> Levels:
+    """The figures with their standard deviations."""
+    rows = [_figure(material, place) for place in wanted]
+    level, std, gauss = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    hz = np.array([p.at if p.kind == "rms" and p.band_hz is not None else np.nan for p in wanted])
+    width = np.array([p.width if p.kind == "rms" and p.band_hz is not None else np.nan for p in wanted])
+    return Levels.of(level, std, frequency_hz=hz, bandwidth_hz=width, gauss_db=gauss)
+
+
+def _figure(material: Material, place: Place) -> tuple[float, float, float]:
+    """Level, standard deviation, and the level of Gaussian noise (NaN where noise is no matter)."""
+    if place.band_hz is not None:
+        power, edges = _band_power(material, place.channel, place.band_hz)
+        parts = _means(edges, power, power**2)
+        if place.kind == "rms":
+            return (*_of_parts(parts, lambda m: _db(m[0])), math.nan)
+        return (*_of_parts(parts, lambda m: _db(m[1] / max(m[0] ** 2, 1e-300))), _GAUSS_BAND_DB)
+    x = material.samples(place.channel)
+    square = x * x
+    edges = _edges(material, x.size, 0, 1.0, _PARTS)
+    if place.kind == "rms":
+        return (*_of_parts(_means(edges, square), lambda m: _db(m[0])), math.nan)
+    if place.kind == "kurtosis":
+        parts = _means(edges, square, square * square)
+        return (*_of_parts(parts, lambda m: _db(m[1] / max(m[0] ** 2, 1e-300))), _GAUSS_KURTOSIS_DB)
+    if place.kind == "asymmetry":
+        parts = _means(edges, np.where(x > 0, square, 0.0), np.where(x < 0, square, 0.0))
+        return (*_of_parts(parts, lambda m: _db(m[0]) - _db(m[1])), math.nan)
+    if place.kind == "crest":
+        return _crest(square, edges)
+    return (*_steadiness(material, square, place.kind), 0.0 if place.kind == "fluctuation" else math.nan)
+
+
+def _db(value: float) -> float:
+    return 10 * math.log10(max(float(value), 1e-300))
+
+
+def _edges(material: Material, count: int, first: float, stride: float, most: int) -> NDArray[np.intp]:
+    """Where parts of a signal begin and the last one ends: `most`, of whole turns if they hold one each.
+
+    Sample i of the signal is sample `first` + i * `stride` of the record.
+    """
+    even = np.asarray(np.linspace(0, count, most + 1), dtype=np.intp)
+    if material.phase is None:
+        return even
+    turns = material.turns_at(first + stride * np.array([0.0, count - 1.0]))
+    whole = math.floor(turns[1] - turns[0])
+    each = whole // most
+    if each < 1:
+        return even
+    marks = turns[0] + each * np.arange(most + 1)
+    at = (np.interp(marks, material.phase.turns, material.phase.samples) - first) / stride
+    return np.asarray(np.clip(np.round(at), 0, count), dtype=np.intp)
+
+
+def _means(edges: NDArray[np.intp], *signals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means over the parts of the record, shape (parts, signals)."""
+    sums = [np.add.reduceat(s[: edges[-1]], edges[:-1]) for s in signals]
+    return np.stack(sums, axis=1) / np.diff(edges)[:, None]
+
+
+def _band_power(
+    material: Material, channel: str, band: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    power, first, stride = material.band_power(channel, band)
+    return power, _edges(material, power.size, first, stride, _PARTS)
+
+
+def _of_parts(parts: NDArray[np.float64], figure: object) -> tuple[float, float]:
+    value, pseudo = jackknife(parts, figure)  # type: ignore[arg-type]
+    return value, max(float(pseudo.std(ddof=1)) / math.sqrt(parts.shape[0]), LEAST_STD_DB)
+
+
+def _crest(square: NDArray[np.float64], edges: NDArray[np.intp]) -> tuple[float, float, float]:
+    """Mean over the parts of the peak, over the rms of all."""
+    peaks = np.maximum.reduceat(square[: edges[-1]], edges[:-1])
+    each = 10 * np.log10(np.maximum(peaks, 1e-300) / max(float(square.mean()), 1e-300))
+    # The largest of n Gaussian values is about sqrt(2 ln n) of them.
+    gauss = 10 * math.log10(2 * math.log(max(square.size // _PARTS, 3)))
+    return float(each.mean()), max(float(each.std(ddof=1)) / math.sqrt(_PARTS), LEAST_STD_DB), gauss
+
+
+def _steadiness(material: Material, square: NDArray[np.float64], kind: str) -> tuple[float, float]:
+    """Drift, scatter and extremes of the level over short blocks, each a turn of the shaft or longer."""
+    turns = material.view.turns
+    count = int(np.clip(turns, 8, _BLOCKS)) if math.isfinite(turns) else _BLOCKS
+    edges = _edges(material, square.size, 0, 1.0, count)
+    power = _means(edges, square)[:, 0]
+    least = 1e-4 * float(power.mean())
+    level = 10 * np.log10(np.maximum(power, least if least > 0 else 1e-300))
+    time = np.linspace(-0.5, 0.5, count)
+    slope = float(np.sum(time * level) / np.sum(time**2))
+    rest = level - level.mean() - slope * time
+    scatter = float(np.sqrt(np.sum(rest**2) / (count - 2)))
+    if kind == "drift":
+        return slope, max(scatter / math.sqrt(float(np.sum(time**2))), LEAST_STD_DB)
+    if kind == "fluctuation":
+        value = 1 + (scatter / _SCATTER_DB) ** 2
+        share = 1 - 1 / value
+        # The variance of a variance, with the kurtosis that the blocks have.
+        kurtosis = float(np.mean(rest**4) / max(float(np.mean(rest**2)) ** 2, 1e-300))
+        spread = math.sqrt(max(kurtosis - 1, 2.0) / count)
+        return 10 * math.log10(value), max(DB * share * spread, LEAST_STD_DB)
+    # Extremes of some forty Gaussian values scatter by 0.45 of their standard deviation, the median by 0.2.
+    centre = float(np.median(level))
+    extreme = float(level.min() if kind == "quiet" else level.max())
+    return extreme - centre, max(0.5 * scatter, LEAST_STD_DB)
