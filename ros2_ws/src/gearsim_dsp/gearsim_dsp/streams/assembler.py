@@ -74,7 +74,9 @@ class Window:
     pulses: tuple[PulseTrain, ...]
     run: int
     note: str = ""
-    _spectra: dict[int, tuple[WindowSpectrum, WindowSpectrum]] = field(default_factory=dict, repr=False)
+    _spectra: dict[int, tuple[WindowSpectrum, WindowSpectrum]] = field(
+        default_factory=dict, repr=False, init=False
+    )
 
     def spectra(self, row: int) -> tuple[WindowSpectrum, WindowSpectrum]:
         """Spectrum of a channel, and without its lines: made once for all monitors that look at it."""
