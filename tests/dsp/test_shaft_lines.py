@@ -8,7 +8,14 @@ from bearing_signals import Signal, defect, machine, noise, rotating_lines, turn
 from pooling import verdict_of
 
 from gearsim_dsp.kinematics import FaultFamily, bearing_orders
-from gearsim_dsp.shaft_lines import covering_multiple
+from gearsim_dsp.shaft_lines import (
+    ShaftMultiple,
+    SpectrumView,
+    covering_multiple,
+    other_shafts,
+    over_shaft,
+    strongest_other_multiple,
+)
 from gearsim_io.machines import load_machine
 from gearsim_io.nameplate import Bearing, Shaft
 
@@ -87,3 +94,44 @@ def test_planets_that_pass_are_no_bearing():
     assert covering_multiple(plate, family, 0.02, 0.0) is None
     (bare,) = [replace(plate, planetary_stages=())]
     assert covering_multiple(bare, family, 0.02, 0.0) is not None
+
+
+STEP, WIDE = 0.02, 2
+
+
+def _spectrum(heights):
+    """Lines at orders over an axis up to 50, on a floor of 1e-6; shape (1, lines)."""
+    power = np.full((1, 2501), 1e-6)
+    for order, height in heights.items():
+        power[0, round(order / STEP)] = height
+    return power
+
+
+def test_the_shafts_other_multiples_are_rivals():
+    power = _spectrum({4.0 * k: 0.01 for k in range(1, 13)} | {5.0 * k: 0.5 for k in range(1, 10)})
+    # Of 4, 8 ... 32 that at 20 is one of the fives, too.
+    assert strongest_other_multiple(power[0], STEP, WIDE, 1.0, 5) == pytest.approx(2 * 7 * 0.01, rel=0.01)
+    assert strongest_other_multiple(_spectrum({})[0], STEP, WIDE, 1.0, 5) < 1e-4
+
+
+def test_lines_are_measured_against_those_between():
+    heights = {float(k): 0.01 for k in range(1, 50)} | {5.0 * k: 0.3 for k in range(1, 10)}
+    power = _spectrum(heights)
+    view = SpectrumView(power / 1e-6, np.zeros_like(power), power - 1e-6, np.zeros(2501, dtype=bool))
+    free = np.ones(2501, dtype=bool)
+    free[round(15 / STEP)] = False
+    over = over_shaft(view, power, STEP, WIDE, 1.0, 5, free)
+    for k in (1, 2, 4):
+        at = round(5 * k / STEP)
+        assert over.usable[at]
+        assert over.ratio[0, at] == pytest.approx(30.0)
+        assert over.excess[0, at] == pytest.approx(0.29)
+        assert over.tail[0, at] == pytest.approx(8 * np.log(1 + 30 / 8), rel=0.01), "F(2, 16) at 30"
+    assert not over.usable[round(15 / STEP)], "another shaft's line"
+    assert not over.usable[round(4 / STEP)]
+
+
+def test_shafts_that_share_the_multiple_do_not_forbid_it():
+    plate = replace(_plate(), shafts=(Shaft("shaft", 1.0, SPEED), Shaft("output", 0.75, 15.0)))
+    assert other_shafts(plate, ShaftMultiple("output", 0.75, 5), 0.02) == [1.0]
+    assert other_shafts(plate, ShaftMultiple("output", 0.75, 4), 0.02) == []
