@@ -176,3 +176,22 @@ def test_a_refused_machine_counts_for_nothing():
     refused = {"name": "random-1-9", "set": "random", "kind": "x", "refused": "teeth: got 3"}
     assert summary([refused, result([])])["cases"] == 1
     assert "1 further machines were refused" in evaluation_page([refused, result([])])
+
+
+def spall(name, side, told, count=16):
+    evidence = {"features": {}, "side": told, "impulses_per_4_carrier_turns": count}
+    said = {"component": "insert.planet", "fault": "planet_tooth_spall", "confidence": 0.9}
+    one = result([{**said, "evidence": evidence}], [("planet_1", "planet_tooth_spall")], name=name)
+    one["truths"][0]["side"] = side
+    return one
+
+
+def test_the_page_tells_sides_apart_from_those_left_open():
+    cases = [("sun", "sun"), ("ring", "ring"), ("ring", "undecided"), ("ring", "sun")]
+    results = [spall(f"table77-1-{k}", *one) for k, one in enumerate(cases)]
+    text = evaluation_page(results)
+    assert "wrong or left open | 2 of 4 (50.0 %" in text
+    assert "of those told | 1 of 3 (33.3 %" in text
+    assert "counted as 32 or 16 | 4 of 4" in text
+    results[0]["findings"][0]["evidence"]["impulses_per_4_carrier_turns"] = 32
+    assert "counted as 32 or 16 | 3 of 4" in evaluation_page(results)

@@ -83,6 +83,8 @@ def _section(set_name: str, seed: str, results: list[Result]) -> str:
     if set_name == "random":
         lines += [f"| of these with two faults | {rate([one for one in faulty if len(one['truths']) > 1])} |"]
     if set_name == "table77":
+        lines += _counts(fine)
+    if any(truth["side"] for one in fine for truth in one["truths"]):
         lines += _sides(fine)
     lines += [f"| CPU time of a diagnosis, median | {_median([one['cpu_s'] for one in fine]):.2f} s |", ""]
     if faulty:
@@ -92,10 +94,13 @@ def _section(set_name: str, seed: str, results: list[Result]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _counts(fine: list[Result]) -> list[str]:
+    faulty = [one for one in fine if one["truths"]]
+    counts = Rate(sum(_count_is_right(one) for one in faulty), len(faulty))
+    return [f"| impulses in four turns of the carrier counted as 32 or 16 | {counts} |"]
+
+
 def _sides(fine: list[Result]) -> list[str]:
-    counts = Rate(
-        sum(_count_is_right(one) for one in fine if one["truths"]), sum(bool(one["truths"]) for one in fine)
-    )
     spalls = [
         (truth["side"], finding["evidence"].get("side"))
         for one in fine
@@ -103,10 +108,12 @@ def _sides(fine: list[Result]) -> list[str]:
         for finding in one["findings"]
         if truth["side"] and finding["fault"] == truth["fault"]
     ]
-    sides = Rate(sum(true == told for true, told in spalls), len(spalls))
+    said = [(true, told) for true, told in spalls if told in ("sun", "ring")]
+    right = Rate(sum(true == told for true, told in spalls), len(spalls))
+    wrong = Rate(sum(true != told for true, told in said), len(said))
     return [
-        f"| impulses in four turns of the carrier counted as 32 or 16 | {counts} |",
-        f"| side of the spalled flank told | {sides} |",
+        f"| side of a planet's spall told rightly; the others are wrong or left open | {right} |",
+        f"| side told wrongly, of those told | {wrong} |",
     ]
 
 

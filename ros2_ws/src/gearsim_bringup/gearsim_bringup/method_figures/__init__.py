@@ -27,4 +27,5 @@ FIGURES: tuple[str, ...] = (
     "speed_without_tacho",
     "squared_envelope_spectrum",
     "synchronous_average",
+    "whirl",
 )
