@@ -1,0 +1,77 @@
+"""Causes on their way: fitted candidates, the rounds they compete in, and those that were taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gearsim_twin.fit import Fitted
+from gearsim_twin.holdout import Gain
+from gearsim_twin.model import Extension
+from gearsim_twin.screen import Screened
+
+__all__ = ["Candidate", "Choice", "Round"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A fitted cause in a round.
+
+    Attributes
+    ----------
+    fitted : Fitted
+    lead_nats : float
+        Log of its posterior odds against no further cause.
+    prior_nats : float
+        What of that was known beforehand.
+    probability : float
+        Among all candidates of the round and no further cause.
+    gain : Gain or None
+        On held-out records; None where nothing was held out or it was never near.
+    """
+
+    fitted: Fitted
+    lead_nats: float
+    prior_nats: float = 0.0
+    probability: float = 0.0
+    gain: Gain | None = None
+
+    @property
+    def extension(self) -> Extension:
+        """The cause with its values."""
+        return self.fitted.trial.model.extensions[-1]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Round:
+    """Candidates of a round by descending probability, and the guesses that were not worth a fit."""
+
+    candidates: tuple[Candidate, ...]
+    left: tuple[Screened, ...]
+    taken: int | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """A cause that was taken.
+
+    Attributes
+    ----------
+    round : Round
+        In which it was taken, with its rivals.
+    candidate : Candidate
+        What it was there.
+    probability : float
+        That it is there, and none of its rivals in its place, given the final model.
+    gain : Gain or None
+        What it gains on held-out records in the final model.
+    """
+
+    round: Round
+    candidate: Candidate
+    probability: float = 0.0
+    gain: Gain | None = None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What makes it the same cause as another."""
+        return self.candidate.extension.key

@@ -1,0 +1,167 @@
+"""Fits of causes by simulation: Gauss-Newton steps from differences between simulations.
+
+All simulations of a fit have the same seed (common random numbers), so that differences between them are
+what the parameters do. Each step lets the tuning adapt by its known slopes, and counts only after a
+simulation has confirmed it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsim_twin.causes.cause import Parameter
+from gearsim_twin.likelihood import Posterior, Yardstick
+from gearsim_twin.model import Model
+from gearsim_twin.stack import Array
+from gearsim_twin.workbench import Trial, Workbench
+
+__all__ = ["Fitted", "fit", "fit_tuning", "judged"]
+
+_STEPS = 3
+# Longest step, in standard deviations of the prior: beyond, levels are no longer linear in the parameters.
+_LONGEST = 1.5
+# A step shorter than this part of the posterior's standard deviation changes nothing that could be seen.
+_SHORT = 0.25
+_TUNING_STEP = 0.5
+_PLAIN_STEP = 0.25
+# After a longer step than this, slopes are taken anew.
+_FAR = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A model fitted to the training records.
+
+    Attributes
+    ----------
+    trial : Trial
+    slopes : ndarray, shape (n, p)
+        Of the levels by the coordinates of the model, dB.
+    posterior : Posterior
+        Around the trial.
+    evidence : float
+        Log evidence in nats, at what was simulated.
+    """
+
+    trial: Trial
+    slopes: Array
+    posterior: Posterior
+    evidence: float
+
+    @property
+    def at(self) -> Array:
+        """Coordinates of the trial."""
+        return np.array(self.trial.model.coordinates, dtype=np.float64)
+
+
+def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
+    """The model tuned to the training records, with the slopes of the knobs."""
+    start = np.array(model.knobs, dtype=np.float64)
+    steps = np.where(start > 0, -_TUNING_STEP, _TUNING_STEP) * np.eye(start.size)
+    trials = bench.trials([model, *(model.tuned(tuple(start + step)) for step in steps)])
+    slopes = _slopes(trials[0], trials[1:], np.diag(steps))
+    best, value = trials[0], yard.value(trials[0].levels, start)
+    for _ in range(_STEPS - 1):
+        here = np.array(best.model.knobs)
+        step = _held(yard.posterior(best.levels, slopes, here).coordinates - here)
+        if not step.size or float(np.max(np.abs(step))) < 0.1:
+            break
+        (trial,) = bench.trials([model.tuned(tuple(here + step))])
+        found = yard.value(trial.levels, here + step)
+        if found <= value:
+            break
+        best, value = trial, found
+    return judged(yard, best, slopes)
+
+
+def judged(yard: Yardstick, trial: Trial, slopes: Array) -> Fitted:
+    """A trial by a yardstick, with the slopes of its coordinates."""
+    here = np.array(trial.model.coordinates, dtype=np.float64)
+    posterior = yard.posterior(trial.levels, slopes, here)
+    return Fitted(trial, slopes, posterior, yard.value(trial.levels, here) + posterior.volume)
+
+
+def fit(bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array) -> Fitted:
+    """The last cause of a model fitted to the training records, everything else adapting to it.
+
+    Parameters
+    ----------
+    bench, yard
+    first : Trial
+        Of the model with the cause as first guessed.
+    known_slopes : ndarray, shape (n, q)
+        Of the coordinates of the model without its last cause.
+    """
+    best, own = first, first.model.own[-1]
+    slopes = _with_own(bench, first, known_slopes)
+    at = np.array(first.model.coordinates, dtype=np.float64)
+    value = yard.value(first.levels, at)
+    for turn in range(_STEPS):
+        posterior = yard.posterior(best.levels, slopes, at)
+        step = _held(posterior.coordinates - at)
+        spread = np.sqrt(np.diag(posterior.covariance))
+        if not step.size or np.all(np.abs(step) < _SHORT * spread):
+            break
+        trial, found, moved = _search(bench, yard, best, at, step, value)
+        if trial is None:
+            break
+        if turn < _STEPS - 1 and float(np.max(np.abs(moved[own]), initial=0.0)) > _FAR:
+            slopes = _with_own(bench, trial, known_slopes)
+        best, value, at = trial, found, at + moved
+    return judged(yard, best, slopes)
+
+
+def _search(
+    bench: Workbench, yard: Yardstick, best: Trial, at: Array, step: Array, value: float
+) -> tuple[Trial | None, float, Array]:
+    """The whole step, or a third of it, if it is an improvement."""
+    for part in (1.0, 0.33):
+        (trial,) = bench.trials([best.model.at(at + part * step)])
+        found = yard.value(trial.levels, at + part * step)
+        if found > value:
+            return trial, found, part * step
+    return None, value, np.zeros_like(step)
+
+
+def _held(step: Array) -> Array:
+    longest = float(np.max(np.abs(step), initial=0.0))
+    return step if longest <= _LONGEST else step * (_LONGEST / longest)
+
+
+def _with_own(bench: Workbench, trial: Trial, known_slopes: Array) -> Array:
+    """Slopes of all coordinates: those of the last cause between those of the others and of the knobs."""
+    return np.insert(known_slopes, [trial.model.own[-1].start], _own_slopes(bench, trial), axis=1)
+
+
+def _own_slopes(bench: Workbench, trial: Trial) -> Array:
+    """Slopes of the last cause, by one more simulation per parameter."""
+    last = trial.model.extensions[-1]
+    here = np.array(last.coordinates)
+    steps = [
+        _step(p, float(last.values[p.name]), u) for p, u in zip(last.cause.parameters, here, strict=True)
+    ]
+    models = []
+    for k, step in enumerate(steps):
+        beside = here.copy()
+        beside[k] += step
+        models.append(trial.model.with_last(last.at(tuple(beside))))
+    return _slopes(trial, bench.trials(models), np.array(steps))
+
+
+def _step(parameter: Parameter, value: float, coordinate: float) -> float:
+    """Step of a difference in the coordinate, away from the nearer bound."""
+    if not parameter.step:
+        return -_PLAIN_STEP if coordinate > 0 else _PLAIN_STEP
+    up = parameter.prior.coordinate(value + parameter.step) - coordinate
+    down = parameter.prior.coordinate(value - parameter.step) - coordinate
+    return up if abs(up) >= abs(down) else down
+
+
+def _slopes(trial: Trial, beside: list[Trial], steps: Array) -> Array:
+    columns = [
+        (other.levels.level_db - trial.levels.level_db) / step
+        for other, step in zip(beside, steps, strict=True)
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((trial.levels.level_db.size, 0))

@@ -1,0 +1,93 @@
+"""Which causes are worth a fit: one simulation per first guess, its strength scaled afterwards.
+
+What most causes add is power: at strength a the power at a place is that of the base plus a times what the
+guess added. So one simulation tells how well the cause would do at any strength, near enough to rank it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsim_twin.causes.cause import Cause
+from gearsim_twin.causes.context import Context
+from gearsim_twin.fit import Fitted
+from gearsim_twin.likelihood import Yardstick
+from gearsim_twin.model import Extension
+from gearsim_twin.stack import Array, Levels
+from gearsim_twin.workbench import Trial, Workbench
+
+__all__ = ["Screened", "first_guesses", "screen"]
+
+_STRENGTHS = 2.0 ** np.arange(-5, 6)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screened:
+    """A first guess, simulated.
+
+    Attributes
+    ----------
+    trial : Trial
+    nats : float
+        By how much the log likelihood is better than without, at the best strength.
+    guesses : int
+        How many guesses that cause had.
+    """
+
+    trial: Trial
+    nats: float
+    guesses: int
+
+    @property
+    def extension(self) -> Extension:
+        """The cause with its guess."""
+        return self.trial.model.extensions[-1]
+
+
+def first_guesses(causes: tuple[Cause, ...], context: Context) -> list[tuple[Extension, int]]:
+    """First guesses of all causes that apply, with the number that the cause had."""
+    found = []
+    for cause in causes:
+        if not cause.applies(context):
+            continue
+        guesses = cause.starts(context)
+        found += [(Extension(cause, guess, context), len(guesses)) for guess in guesses]
+    return found
+
+
+def screen(
+    bench: Workbench, yard: Yardstick, base: Fitted, guesses: list[tuple[Extension, int]]
+) -> list[Screened]:
+    """All guesses by how much better than the base they do, best first; one per cause and component."""
+    trials = bench.trials([base.trial.model.extended(extension) for extension, _ in guesses])
+    before = yard.value(base.trial.levels, base.at)
+    best: dict[tuple[str, str], Screened] = {}
+    for trial, (extension, count) in zip(trials, guesses, strict=True):
+        found = Screened(trial, _best_value(yard, base, trial) - before, count)
+        known = best.get(extension.key)
+        if known is None or known.nats < found.nats:
+            best[extension.key] = found
+    return sorted(best.values(), key=lambda each: -each.nats)
+
+
+def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
+    """Log probability of the guess as simulated, or at a strength that does better, all else adapting."""
+    noise = base.posterior.noise
+    candidates = [trial.levels]
+    below, above = _power(base.trial.levels.level_db), _power(trial.levels.level_db)
+    if trial.model.extensions[-1].cause.parameters:
+        for strength in _STRENGTHS:
+            power = np.maximum(below + strength * (above - below), 1e-3 * np.minimum(below, above))
+            candidates.append(Levels(10.0 * np.log10(power), trial.levels.std_db))
+    adapted = [yard.adapted(levels, base.slopes, base.at, noise) for levels in candidates]
+    values = [
+        float(yard.loglike(yard.residual(levels), yard.variance(levels), noise).sum()) - 0.5 * float(at @ at)
+        for levels, at in adapted
+    ]
+    return yard.value(*adapted[int(np.argmax(values))])
+
+
+def _power(level_db: Array) -> Array:
+    return np.asarray(10.0 ** (0.1 * level_db))

@@ -1,0 +1,193 @@
+"""Choosing causes one by one, with rivals, probabilities and reasons.
+
+In each round the first guesses of all causes are simulated, the best few are fitted, and their evidence is
+compared with that of no further cause. A cause is taken if it is probable (its evidence includes the price of
+its freedom and of there being so many to choose from), if what it predicts for the held-out records is
+significantly better, and if that is more than a trifle. What was taken before is tried again without.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from gearsim_twin.causes.cause import Cause
+from gearsim_twin.causes.context import Context
+from gearsim_twin.choices import Candidate, Choice, Round
+from gearsim_twin.fit import Fitted, fit, judged
+from gearsim_twin.likelihood import Yardstick
+from gearsim_twin.needed import gain_between, needed, settled
+from gearsim_twin.screen import Screened, first_guesses, screen
+from gearsim_twin.settings import Settings
+from gearsim_twin.workbench import Trial, Workbench
+
+__all__ = ["Selection", "select"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Selection:
+    """What was found.
+
+    Attributes
+    ----------
+    tuned : Fitted
+    final : Fitted
+        The extended model; the coordinates of its posterior are those of all causes in their order, then
+        those of the tuning.
+    choices : tuple of Choice
+        In the order of the extensions of the final model.
+    rounds : tuple of Round
+    yard : Yardstick
+        By which the final model was judged.
+    """
+
+    tuned: Fitted
+    final: Fitted
+    choices: tuple[Choice, ...]
+    rounds: tuple[Round, ...]
+    yard: Yardstick
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """What stays the same over the rounds."""
+
+    bench: Workbench
+    causes: tuple[Cause, ...]
+    context_of: Callable[[Trial], Context]
+    settings: Settings
+    tell: Callable[[str], None]
+
+
+def select(
+    bench: Workbench,
+    yard: Yardstick,
+    tuned: Fitted,
+    causes: tuple[Cause, ...],
+    context_of: Callable[[Trial], Context],
+    settings: Settings,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Selection:
+    """Causes that explain what the tuned model misses.
+
+    Parameters
+    ----------
+    bench : Workbench
+    yard : Yardstick
+        Of the training records.
+    tuned : Fitted
+        The tuned model with the slopes of its knobs.
+    causes : tuple of Cause
+    context_of : callable
+        What causes may look at, for a trial.
+    settings : Settings
+    tell : callable
+        Gets a line on what is being done.
+    """
+    search = _Search(bench, causes, context_of, settings, tell)
+    current = tuned
+    rounds: list[Round] = []
+    choices: list[Choice] = []
+    certain = (yard, tuned, choices)
+    tentative = False
+    while len(choices) < settings.most_causes:
+        done, yard, current = _round(search, yard, current, {choice.key for choice in choices}, len(rounds))
+        rounds.append(done)
+        if done.taken is not None:
+            number = done.taken
+        elif not tentative and done.candidates and done.candidates[0].lead_nats > settings.hint_nats:
+            number = 0
+        else:
+            break
+        tentative = done.taken is None
+        candidate = done.candidates[number]
+        choices = [*choices, Choice(done, candidate)]
+        current = settled(bench, yard, candidate.fitted)
+        if not tentative:
+            current, choices = needed(bench, yard, settings, current, choices)
+            certain = (yard, current, choices)
+    yard, current, choices = certain
+    return Selection(tuned, current, tuple(choices), tuple(rounds), yard)
+
+
+def _round(
+    search: _Search, yard: Yardstick, current: Fitted, taken: set[tuple[str, str]], number: int
+) -> tuple[Round, Yardstick, Fitted]:
+    context = search.context_of(current.trial)
+    guesses = [
+        (extension, count)
+        for extension, count in first_guesses(search.causes, context)
+        if extension.key not in taken
+    ]
+    search.tell(f"trying {len(guesses)} first guesses")
+    screened = screen(search.bench, yard, current, guesses)
+    chosen = _worth_fitting(screened, search.settings)
+    fits = []
+    for each in chosen:
+        search.tell(f"fitting {each.extension.cause.name}")
+        fits.append((fit(search.bench, yard, each.trial, current.slopes), each.guesses))
+    yard, current, fits = _same_measure(yard, current, fits)
+    names = len({extension.cause.name for extension, _ in guesses})
+    candidates = _probable(search.settings, current, fits, names)
+    candidates, accepted = _held_out(search, yard, current, candidates, number)
+    left = tuple(each for each in screened if each not in chosen)
+    return Round(tuple(candidates), left, accepted), yard, current
+
+
+def _worth_fitting(screened: list[Screened], settings: Settings) -> list[Screened]:
+    """The best few, and those that the best may be confused with."""
+    able = [each for each in screened if each.nats > settings.worth_fitting_nats]
+    if not able:
+        return []
+    rivals = {name for name, _ in able[0].extension.cause.confused_with}
+    near = [each for each in able[settings.fits :] if each.extension.cause.name in rivals]
+    return [*able[: settings.fits], *near[:2]]
+
+
+def _same_measure(
+    yard: Yardstick, current: Fitted, fits: list[tuple[Fitted, int]]
+) -> tuple[Yardstick, Fitted, list[tuple[Fitted, int]]]:
+    """All judged by the independence of what the best of them leaves."""
+    everything = [current, *(each for each, _ in fits)]
+    best = max(everything, key=lambda each: each.evidence)
+    levels = best.trial.levels
+    yard = yard.by_independence(best.posterior.residual_db, levels, best.posterior.noise)
+    again = [judged(yard, each.trial, each.slopes) for each in everything]
+    return yard, again[0], [(found, fits[k][1]) for k, found in enumerate(again[1:])]
+
+
+def _probable(
+    settings: Settings, current: Fitted, fits: list[tuple[Fitted, int]], names: int
+) -> list[Candidate]:
+    """Candidates with their probabilities, the most probable first."""
+    prior = [settings.prior_nats(names, count) for _, count in fits]
+    leads = [each.evidence - current.evidence + odds for (each, _), odds in zip(fits, prior, strict=True)]
+    most = max([0.0, *leads])
+    total = math.exp(-most) + sum(math.exp(lead - most) for lead in leads)
+    found = [
+        Candidate(each, lead, odds, math.exp(lead - most) / total)
+        for (each, _), lead, odds in zip(fits, leads, prior, strict=True)
+    ]
+    return sorted(found, key=lambda each: -each.lead_nats)
+
+
+def _held_out(
+    search: _Search, yard: Yardstick, current: Fitted, candidates: list[Candidate], number: int
+) -> tuple[list[Candidate], int | None]:
+    """Candidates with their held-out gains, and which one is taken."""
+    least = search.settings.convincing_nats
+    near = [each for each in candidates if each.lead_nats > 0.0]
+    if not near:
+        return candidates, None
+    search.tell("checking on held-out records")
+    found = list(candidates)
+    for k, each in enumerate(near):
+        gain = gain_between(search.bench, yard, current, each.fitted, search.settings.seed + number)
+        found[k] = replace(each, gain=gain)
+    passed = (
+        k
+        for k, each in enumerate(found)
+        if each.lead_nats > least and each.gain is not None and each.gain.real(search.settings.trifle_db)
+    )
+    return found, next(passed, None)

@@ -1,0 +1,53 @@
+"""How hard the judge tries, and what counts as known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["Settings"]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How hard to try, and what counts as known.
+
+    Attributes
+    ----------
+    most_causes : int
+        Causes that one model may get.
+    fits : int
+        Causes that are fitted in a round, those that the best one may be confused with not counted.
+    worth_fitting_nats : float
+        Better log likelihood at the first guess, below which no fit is tried.
+    another : float
+        Probability beforehand that there is a cause, or one more.
+    doubt : float
+        Probability of no further cause below which one is taken.
+    hint_nats : float
+        Lead above which the best cause of a round, although not taken, is kept while one more is looked for:
+        of two that hide each other neither may be convincing alone.
+    trifle_db : float
+        Fall of the held-out rms error in the affected domain below which it is not worth a cause.
+    seed : int
+        Of the intervals of held-out gains.
+    """
+
+    most_causes: int = 3
+    fits: int = 4
+    worth_fitting_nats: float = 1.0
+    another: float = 0.3
+    doubt: float = 0.05
+    hint_nats: float = -2.5
+    trifle_db: float = 0.02
+    seed: int = 1
+
+    @property
+    def convincing_nats(self) -> float:
+        """Lead over no further cause at which one is taken."""
+        return math.log((1.0 - self.doubt) / self.doubt)
+
+    def prior_nats(self, names: int, guesses: int) -> float:
+        """Log odds beforehand of one guess of a cause, among so many causes and guesses."""
+        odds = math.log(self.another / (1.0 - self.another))
+        return odds - math.log(max(names, 1)) - math.log(max(guesses, 1))

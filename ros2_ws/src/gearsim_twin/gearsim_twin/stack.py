@@ -1,0 +1,161 @@
+"""The places of several records as one set of arrays, and which of them are neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gearsim_twin.compare.features import Features
+    from gearsim_twin.compare.places import Place
+
+__all__ = ["ASSUMED", "Assumed", "Levels", "Stack", "levels_of", "stack_of"]
+
+ASSUMED = "assumed"
+"""Name of the domain of assumptions."""
+# A line off its place by the width at which lines no longer coincide counts as much as one too weak by half.
+_WIDTH_DB = 6.0
+_NO_RECORD = -1
+# Where only the measured record says something the model says that anything may be.
+SILENT_DB = 20.0
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """What is taken as known, beside what is measured, such as that a sensor's gain is right.
+
+    It counts like a place at which 0 dB was measured with the standard deviation `std_db`; what the model
+    has there is the correction that it needed.
+    """
+
+    channel: str
+    kind: str
+    std_db: float
+    domain: str = ASSUMED
+    at: float = 0.0
+    width: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Levels:
+    """Levels at all places of a stack with their sampling standard deviations, dB, each of shape (n,)."""
+
+    level_db: Array
+    std_db: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stack:
+    """Measured levels of several records, and after them what is assumed.
+
+    Attributes
+    ----------
+    places : tuple of Place or Assumed, length n
+    measured : Levels
+    domains : tuple of str
+        Names that `domain` counts.
+    record, domain : ndarray of int, shape (n,)
+        Which record and which domain a place belongs to; -1 is the record of what is assumed.
+    line : ndarray of int, shape (n,)
+        The same number for one place seen by other channels or in other records.
+    channel : ndarray of int, shape (n,)
+        The same number for one channel.
+    run : ndarray of int, shape (n,)
+        The same number along one representation of one channel of one record.
+    order : ndarray of int, shape (n,)
+        Sorts places along each run.
+    """
+
+    places: tuple[Place | Assumed, ...]
+    measured: Levels
+    domains: tuple[str, ...]
+    record: Codes
+    domain: Codes
+    line: Codes
+    channel: Codes
+    run: Codes
+    order: Codes
+
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Which places the measured records say something of, shape (n,)."""
+        return np.isfinite(self.measured.level_db) & np.isfinite(self.measured.std_db)
+
+    @property
+    def size(self) -> int:
+        """Number of places of all records together."""
+        return len(self.places)
+
+    def part(self, records: Sequence[int]) -> NDArray[np.bool_]:
+        """Which places belong to some of the records, shape (n,)."""
+        return np.isin(self.record, np.asarray(records))
+
+    def filled(self, features: Mapping[int, Features], corrections_db: Sequence[float] = ()) -> Levels:
+        """Predicted levels of some records; elsewhere those measured, without uncertainty.
+
+        `corrections_db` has what the model needed of each assumption, in the order of `stack_of`.
+        """
+        level, std = self.measured.level_db.copy(), np.zeros(self.size)
+        for record, each in features.items():
+            mine = self.record == record
+            part = levels_of([each])
+            silent = ~(np.isfinite(part.level_db) & np.isfinite(part.std_db))
+            level[mine] = np.where(silent, level[mine], part.level_db)
+            std[mine] = np.where(silent, SILENT_DB, part.std_db)
+        if corrections_db:
+            level[self.record == _NO_RECORD] = np.asarray(corrections_db, dtype=np.float64)
+        return Levels(level, std)
+
+
+def _codes(keys: Sequence[Hashable]) -> Codes:
+    numbers: dict[Hashable, int] = {}
+    return np.array([numbers.setdefault(key, len(numbers)) for key in keys], dtype=np.intp)
+
+
+def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> Stack:
+    """The measured features of several records, one entry per record, and what is assumed."""
+    places: tuple[Place | Assumed, ...] = (
+        *(place for features in measured for place in features.places),
+        *assumed,
+    )
+    counts = [len(features.places) for features in measured]
+    record = np.repeat([*range(len(measured)), _NO_RECORD], [*counts, len(assumed)]).astype(np.intp)
+    names = tuple(dict.fromkeys(place.domain for place in places))
+    at = np.array([place.at for place in places], dtype=np.float64)
+    run = _codes([(k, p.domain, p.channel, p.kind) for k, p in zip(record.tolist(), places, strict=True)])
+    found = levels_of(measured)
+    return Stack(
+        places=places,
+        measured=Levels(
+            np.concatenate([found.level_db, np.zeros(len(assumed))]),
+            np.concatenate([found.std_db, np.array([each.std_db for each in assumed], dtype=np.float64)]),
+        ),
+        domains=names,
+        record=record,
+        domain=np.array([names.index(place.domain) for place in places], dtype=np.intp),
+        line=_codes([(place.domain, place.kind, place.at) for place in places]),
+        channel=_codes([place.channel for place in places]),
+        run=run,
+        order=np.lexsort((at, run)),
+    )
+
+
+def levels_of(features: Sequence[Features]) -> Levels:
+    """Levels of several records behind one another; distances of lines from their places as levels."""
+    empty = np.zeros(0)
+    scale = np.array([_scale(place) for each in features for place in each.places], dtype=np.float64)
+    return Levels(
+        np.concatenate([empty, *(each.level_db for each in features)]) * scale,
+        np.concatenate([empty, *(each.std_db for each in features)]) * scale,
+    )
+
+
+def _scale(place: Place) -> float:
+    return _WIDTH_DB / place.width if place.kind == "ratio" else 1.0
