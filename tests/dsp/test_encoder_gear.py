@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from gearsim_dsp.judges.encoder_gear import spall_probability, stands_out
 from gearsim_dsp.judges.gear import judge_gears
+from gearsim_dsp.judges.shaft import shaken_shafts
 from gearsim_dsp.judges.tooth_errors import tooth_errors
 
 SPEED_HZ, SECONDS = 20.0, 4.0
@@ -115,3 +116,17 @@ def test_encoders_too_coarse_for_the_teeth_tell_nothing():
         "output": edges("output", SPEED_HZ * PINION / GEAR, SECONDS, 64),
     }
     assert tooth_errors(box_of(coarse), gearbox(PINION, GEAR).gear_meshes[0]) == ()
+
+
+def test_a_shaft_that_shakes_all_round_is_no_fault_of_its_wheel():
+    """Unbalance of 1 mm/s moves the wheel along the line of action, once a turn: not its teeth's doing."""
+    encoders = trains(1, cracked="input", crack=7e-5)
+    still = box_of(encoders)
+    shake = 1e-3 * np.sqrt(2) * 2 * np.pi * SPEED_HZ * np.cos(2 * np.pi * turns(SPEED_HZ, SECONDS))
+    noise = 0.02 * np.random.default_rng(3).standard_normal(shake.size)
+    shaken = measured(
+        still.machine, {"in_y": still.channels["in_y"] + shake, "in_x": shake + noise}, still.speed, encoders
+    )
+    assert shaken_shafts(shaken) == {"input"}
+    assert shaken_shafts(still) == set()
+    assert judge_gears(shaken) == ()

@@ -61,6 +61,20 @@ def test_many_orders_and_halves_on_one_foot_are_looseness():
     assert (finding.component, finding.fault) == ("bearing_1", "looseness")
 
 
+@pytest.mark.parametrize(("across", "fault"), [(0.02, "looseness"), (0.5, "misalignment")])
+def test_harmonics_in_one_direction_only_are_a_foot_that_lifts(across, fault):
+    """Both bearings of one shaft hear them; a coupling out of line shakes all round."""
+    rattle = sum(line(k, 3.0 / k, 0.3 * k) for k in (1, 2, 3, 4, 5))
+    rows = {
+        "in_y": rattle,
+        "in_x": line(1, 2.0, 1.9) + across * (rattle - line(1, 3.0)),
+        "out_y": 0.6 * rattle,
+    }
+    _, findings = judge(rows)
+    assert findings[0].fault == fault
+    assert findings[0].component == ("bearing_1" if fault == "looseness" else "input")
+
+
 @pytest.mark.parametrize("velocity", [0.3, 1.0])
 def test_levels_of_sound_rigs_are_no_finding(velocity):
     """The MFPT baselines have 1.0 mm/s at order 1 and 0.5 mm/s at its harmonics."""

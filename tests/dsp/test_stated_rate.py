@@ -79,6 +79,11 @@ def test_a_machine_off_its_nameplate_beside_a_supply_in_its_place_is_not_a_wrong
     assert "speed_off_nameplate" in kinds
 
 
+def test_a_machine_run_at_twice_its_nameplate_is_no_matter_of_rates():
+    fast = record(51_200.0, 51_200.0, speed_hz=2 * SPEED_HZ)
+    assert doubt_of_rate(fast, plate(), diagnose_record(fast, plate()).speed) is None
+
+
 def test_a_speed_off_by_no_ratio_of_rates_is_only_off():
     slow = record(25_600.0, 25_600.0, speed_hz=0.9 * SPEED_HZ)
     assert doubt_of_rate(slow, plate(), diagnose_record(slow, plate()).speed) is None

@@ -132,7 +132,8 @@ def _usual_ratio(ratio: float, stated_hz: float) -> float | None:
     if not np.isfinite(ratio):
         return None
     others = [stated_hz / rate for rate in RATES_HZ if abs(stated_hz / rate - 1.0) > _SAME_RATE]
-    near = min(others, key=lambda one: abs(one / ratio - 1.0))
+    others = [one for one in others if _REACH[0] <= one <= _REACH[1]]
+    near = min(others, key=lambda one: abs(one / ratio - 1.0), default=math.nan)
     return near if abs(near / ratio - 1.0) <= _SAME_RATE else None
 
 

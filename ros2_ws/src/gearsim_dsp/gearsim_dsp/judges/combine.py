@@ -12,6 +12,7 @@ _SAME_ORDER = 0.012
 _CLEARLY_ITS_OWN = 3.0
 # What a shaft that shakes its wheel looks like to the judge of gears.
 _SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
+_CRACK_BY_ENCODERS = "transmission error"
 _TOOTH_FAULTS = ("gear_tooth_crack", "gear_tooth_spall", "planet_tooth_crack", "planet_tooth_spall")
 
 
@@ -34,8 +35,14 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
     kept = [one for one in bearings if not any(_is_teeths_doing(one, tooth, measured) for tooth in teeth)]
     shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
-    kept += [one for one in others if not (shaken and one.fault in _SHAKEN_GEARS)]
+    kept += [one for one in others if not (shaken and _is_shaken(one))]
     return tuple(sorted(kept, key=lambda one: -one.confidence))
+
+
+def _is_shaken(finding: Finding) -> bool:
+    """What only looks like a fault of gears: a wheel that is shaken moves along the line of action, too."""
+    by_encoders = finding.evidence.get("witness") == _CRACK_BY_ENCODERS
+    return finding.fault in _SHAKEN_GEARS or (by_encoders and finding.fault == "gear_tooth_crack")
 
 
 def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bool:

@@ -30,6 +30,7 @@ from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.gear_signs import ShaftSigns, shaft_signs
 from gearsim_dsp.judges.measured import Measured, wheels_on
 from gearsim_dsp.judges.runout import wheel_runout
+from gearsim_dsp.judges.shaft import shaken_shafts
 from gearsim_dsp.judges.tooth_errors import ToothError, tooth_errors
 from gearsim_dsp.judges.tooth_kind import tooth_kind
 from gearsim_io.nameplate import GearMesh
@@ -45,6 +46,7 @@ _WEAR_SPREAD = 0.06
 _WEAR_HARMONICS = 0.35
 _WEAR_MEAN, _WEAR_EACH = 1.2, 0.75  # sound gearboxes reach means of 1.12
 _RUNOUT_OF_PITCH = 0.0075
+_HIDDEN_MM_S = 0.8  # of unbalance in the noise, which would look like run-out
 _SEVERE_TOOTH, _MODERATE_TOOTH = 300.0, 30.0
 
 
@@ -56,7 +58,10 @@ def judge_gears(measured: Measured) -> tuple[Finding, ...]:
     geared = {s for mesh in machine.gear_meshes for s in (mesh.driving_shaft, mesh.driven_shaft)}
     ratios = {round(machine.shaft(name).ratio, 9): machine.shaft(name).ratio for name in sorted(geared)}
     signs = [one for ratio in ratios.values() for one in shaft_signs(measured, ratio)]
-    errors = {mesh.name: tooth_errors(measured, mesh) for mesh in machine.gear_meshes}
+    # A shaft that shakes all round takes its wheel along, which encoders cannot tell from teeth.
+    shaken = shaken_shafts(measured)
+    still = [mesh for mesh in machine.gear_meshes if not {mesh.driving_shaft, mesh.driven_shaft} & shaken]
+    errors = {mesh.name: tooth_errors(measured, mesh) for mesh in still}
     found = _by_encoders(measured, signs, errors, bad_tooth_of_mesh)
     found += [_bad_tooth(measured, one) for one in _strongest_teeth(signs)]
     # Both witnesses speak of one tooth; the surer one is heard.
@@ -66,14 +71,17 @@ def judge_gears(measured: Measured) -> tuple[Finding, ...]:
         # What two encoders see of unlike wheels is the better witness, also of sound ones.
         heard = [one for one in signs if not _is_compared(measured, one, errors)]
         found = found or _wear(measured, heard)
-    found += _off_axis(measured)
+    hidden = shaken_shafts(measured, _HIDDEN_MM_S)
+    found += _off_axis(
+        measured, [mesh for mesh in still if not {mesh.driving_shaft, mesh.driven_shaft} & hidden]
+    )
     return tuple(found)
 
 
 def _is_compared(measured: Measured, signs: ShaftSigns, errors: Mapping[str, tuple[ToothError, ...]]) -> bool:
     """True where encoders told the unevenness of this wheel beside that of its mate."""
     mesh = wheel_name(measured, signs.ratio, signs.teeth)[1]
-    return bool(errors[mesh.name]) and mesh.driving_teeth != mesh.driven_teeth
+    return bool(errors.get(mesh.name)) and mesh.driving_teeth != mesh.driven_teeth
 
 
 def _by_encoders(
@@ -84,7 +92,7 @@ def _by_encoders(
 ) -> list[Finding]:
     """What a judge of transmission errors finds in the meshes that have any."""
     channel = signs[0].best.channel if signs else next(iter(measured.channels), "")
-    meshes = [mesh for mesh in measured.machine.gear_meshes if errors[mesh.name]]
+    meshes = [mesh for mesh in measured.machine.gear_meshes if errors.get(mesh.name)]
     return [one for mesh in meshes if (one := judge(measured, mesh, errors[mesh.name], channel))]
 
 
@@ -200,10 +208,10 @@ def _evidence(measured: Measured, signs: ShaftSigns, features: dict[str, float])
     }
 
 
-def _off_axis(measured: Measured) -> list[Finding]:
+def _off_axis(measured: Measured, meshes: list[GearMesh]) -> list[Finding]:
     """The larger run-out of each pair with encoders on both shafts, if it is too large."""
     found = []
-    for mesh in measured.machine.gear_meshes:
+    for mesh in meshes:
         runout = wheel_runout(measured, mesh)
         if runout is None:
             continue

@@ -6,7 +6,8 @@ there is no finding below 1.8 and 1.12 mm/s. What turns with the shaft:
 
 unbalance       order 1 in every direction across the shaft, little else
 misalignment    orders 2 to 8 strong against order 1 (jaws work three times a turn, universal joints twice)
-looseness       many orders, halves among them, on one bearing's pedestal much more than on the others
+looseness       many orders, halves among them, on one bearing's pedestal much more than on the others; or in
+                one direction only, that of lifting, where a coupling shakes all round
 
 The harmonics of a gear mesh lie far above; a wheel off its axis presses along the line of action only, so
 of two directions the weaker one counts where both are measured. An order on the supply's frequency or a
@@ -32,7 +33,7 @@ from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.synchronous.tsa import synchronous_average
 from gearsim_io.nameplate import Bearing, Shaft
 
-__all__ = ["BearingLevels", "bearing_levels", "judge_shafts", "undecided_orders"]
+__all__ = ["BearingLevels", "bearing_levels", "judge_shafts", "shaken_shafts", "undecided_orders"]
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,12 @@ _MODERATE_MM_S, _SEVERE_MM_S = 4.5, 11.2
 _HARMONIC_SHARE = 0.35
 _LOOSE_ORDERS = 6
 _LOOSE_OVER_OTHERS = 2.0
+# One foot that is lifted: couplings out of line shake across by a quarter and more of what they do along.
+_LIFT_SHARE = 0.24
+_LIFT_ORDERS = 4
+_LIFT_OVER_OTHERS = 1.2
+_MAYBE = 0.5  # of what is sure
+_SHAKEN_MM_S = 0.4
 _END = 1 / 3
 _WORSE_DB = 3.0
 _SUPPLY_SHARE = 0.1  # of a tone's amplitude: with less of it left in an order, that order is the shaft's
@@ -70,8 +77,12 @@ class BearingLevels:
         RMS at those orders, 0 at the others, each of the channel that has most.
     all_round_mm_s : float
         Order 1 in the direction in which it is weakest; 0 where it may be the supply's.
-    directions : int
-        Directions measured.
+    across_mm_s : float
+        At most, orders 2 to 8 in the direction in which they are weakest; NaN with one direction.
+    faint_mm_s : float
+        Order 1 in the direction in which it is weakest, also where it is little above the noise.
+    unseen_mm_s : float
+        Order 1 that noise may hide.
     """
 
     bearing: Bearing
@@ -80,7 +91,9 @@ class BearingLevels:
     sure_mm_s: Array
     undecided_mm_s: Array
     all_round_mm_s: float
-    directions: int
+    across_mm_s: float
+    faint_mm_s: float
+    unseen_mm_s: float
 
     @property
     def first(self) -> float:
@@ -142,6 +155,26 @@ def _judged(measured: Measured) -> tuple[Finding, ...]:
     return tuple(found)
 
 
+def shaken_shafts(measured: Measured, hidden_mm_s: float = math.inf) -> set[str]:
+    """Shafts that move once a turn in every direction, and so do not do it for their wheel's teeth.
+
+    Parameters
+    ----------
+    measured : Measured
+    hidden_mm_s : float
+        Shafts that may move by so much without standing out of the noise are counted, too.
+    """
+    if measured.phase is None or measured.unit != "m/s^2":
+        return set()
+    levels = bearing_levels(measured)
+    return {
+        shaft
+        for shaft, group in levels.items()
+        if max(one.faint_mm_s for one in group) >= _SHAKEN_MM_S
+        or min(one.unseen_mm_s for one in group) >= hidden_mm_s
+    }
+
+
 def undecided_orders(measured: Measured) -> tuple[QualityIssue, ...]:
     """Orders that lie on lines of the supply at a constant speed and would weigh if they were the shaft's."""
     if measured.phase is None or measured.unit != "m/s^2":
@@ -176,7 +209,11 @@ def bearing_levels(measured: Measured) -> dict[str, list[BearingLevels]]:
             continue
         if shaft.ratio not in hum:
             hum[shaft.ratio] = _may_be_hum(measured, shaft)
-        every = {name: _velocities(measured, name, shaft) for name in channels}
+        both = {name: _velocities(measured, name, shaft) for name in channels}
+        every = {name: np.where(row > least, row, 0.0) for name, (row, least) in both.items()}
+        upper = [np.maximum(row, _MAYBE * least)[3::2] for row, least in both.values()]
+        faint = [float(row[1]) if row[1] > _MAYBE * least[1] else 0.0 for row, least in both.values()]
+        across = min(float(np.sqrt(np.sum(row**2))) for row in upper) if len(upper) > 1 else math.nan
         rows = {name: np.where(hum[shaft.ratio], 0.0, row) for name, row in every.items()}
         loudest = max(rows, key=lambda name: float(np.sum(rows[name] ** 2)))
         found.setdefault(shaft.name, []).append(
@@ -187,13 +224,16 @@ def bearing_levels(measured: Measured) -> dict[str, list[BearingLevels]]:
                 rows[loudest],
                 np.max([every[name] - rows[name] for name in channels], axis=0),
                 min(float(row[1]) for row in rows.values()),
-                len(rows),
+                across,
+                min(faint),
+                min(_MAYBE * float(least[1]) for _, least in both.values()),
             )
         )
     return found
 
 
-def _velocities(measured: Measured, channel: str, shaft: Shaft) -> Array:
+def _velocities(measured: Measured, channel: str, shaft: Shaft) -> tuple[Array, Array]:
+    """RMS velocities at orders 0.5, 1 ... 8 in mm/s, and what they must exceed to be sure."""
     assert measured.phase is not None
     signal = to_angle(measured.channels[channel], measured.phase, _SAMPLES_PER_TURN, ratio=shaft.ratio)
     average = synchronous_average(signal, _PERIOD_TURNS)
@@ -202,8 +242,9 @@ def _velocities(measured: Measured, channel: str, shaft: Shaft) -> Array:
     noise = 2.0 * average.noise_rms / math.sqrt(average.values.size)
     lines = np.arange(1, 2 * _TOP_ORDER + 1)
     speed = shaft.ratio * measured.speed.value_hz
-    velocity = amplitude[lines] / (2 * np.pi * 0.5 * lines * speed) / math.sqrt(2.0) * 1e3
-    return np.asarray(np.where(amplitude[lines] > _SURE * noise, velocity, 0.0))
+    to_velocity = 1e3 / (2 * np.pi * 0.5 * lines * speed) / math.sqrt(2.0)
+    velocity, least = amplitude[lines] * to_velocity, _SURE * noise * to_velocity
+    return np.asarray(velocity), np.asarray(least)
 
 
 def _may_be_hum(measured: Measured, shaft: Shaft) -> NDArray[np.bool_]:
@@ -220,7 +261,11 @@ def _looseness(measured: Measured, levels: dict[str, list[BearingLevels]]) -> tu
     own = math.hypot(worst.harmonics, worst.halves)
     others = [math.hypot(one.harmonics, one.halves) for one in everyone if one is not worst]
     over = own / max(max(others), 1e-6)
-    if own < _HARMONICS_MM_S or worst.count < _LOOSE_ORDERS or over < _LOOSE_OVER_OTHERS:
+    rattles = worst.count >= _LOOSE_ORDERS and over >= _LOOSE_OVER_OTHERS
+    lifts = (
+        worst.across_mm_s <= _LIFT_SHARE * own and worst.count >= _LIFT_ORDERS and over >= _LIFT_OVER_OTHERS
+    )
+    if own < _HARMONICS_MM_S or not (rattles or lifts):
         return ()
     features = {
         "level": math.log(own / _HARMONICS_MM_S),
