@@ -1,0 +1,210 @@
+"""The measuring chain: what a gain, a noise floor and a low pass do to levels, in closed form.
+
+Per channel a gain, a coloured floor (power density, straight in decibels over the logarithm of frequency
+between a few knots) and a low pass of second order. Nothing is simulated for them. Of a place that holds the
+power P of the model, at the frequency f with the bandwidth B,
+
+    P' = g H^2(f) P + N(f) B,     H^2 = 1 / (1 + (f / f_c)^4).
+
+Modulations and statistics of a band are diluted by the noise. With S and N the densities of model and noise
+in the band, and s the model's share of its power,
+
+    squared envelope spectrum     X' = s^2 X + X_Gauss B (int (S + N)^2 - int S^2) / (int S + N)^2
+    kurtosis, scatter             X' = s^2 X + (1 - s^2) X_Gauss
+    peaks of the squared signal   X' = s X + (1 - s) X_Gauss
+    coherence                     X' = r X + (1 - r) X_Gauss,  r the mean of (S / (S + N))^2 over the band
+
+(the first by the products of the spectra of model and noise that its floor is made of; of white noise it is
+the second). Of an encoder the floor alone counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_twin.compare.features import Features
+from gearsim_twin.compare.levels import Levels
+from gearsim_twin.compare.lines import LEAST_STD_DB
+from gearsim_twin.compare.places import Place
+
+__all__ = ["ChannelNuisance", "Nuisance", "apply"]
+
+Vector = NDArray[np.float64]
+
+_TINY = 1e-300
+_FIRST_ORDER_KINDS = ("crest", "peak")
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelNuisance:
+    """The measuring chain of one channel.
+
+    Attributes
+    ----------
+    channel : str
+    gain_db : float
+    floor_hz, floor_db : tuple of float
+        Knots of the floor: frequency, density in dB of the unit squared per Hz (of an encoder: per order).
+        Beyond the outer knots the floor is level.
+    corner_hz : float
+        Of the low pass; infinite if there is none.
+    """
+
+    channel: str
+    gain_db: float = 0.0
+    floor_hz: tuple[float, ...] = (1.0,)
+    floor_db: tuple[float, ...] = (-math.inf,)
+    corner_hz: float = math.inf
+
+    def gain(self, frequency_hz: Vector) -> Vector:
+        """Power gain at frequencies."""
+        return np.asarray(10 ** (0.1 * self.gain_db) / (1 + (frequency_hz / self.corner_hz) ** 4))
+
+    def floor(self, frequency_hz: Vector) -> Vector:
+        """Power density at frequencies."""
+        if not math.isfinite(self.floor_db[0]):
+            return np.zeros_like(frequency_hz)
+        at = np.log(np.maximum(frequency_hz, 1e-9))
+        return np.asarray(10 ** (0.1 * np.interp(at, np.log(self.floor_hz), self.floor_db)))
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """The measuring chains of all channels; those not listed are ideal."""
+
+    channels: tuple[ChannelNuisance, ...] = ()
+
+    def of(self, channel: str) -> ChannelNuisance:
+        """That of one channel."""
+        return next((c for c in self.channels if c.channel == channel), ChannelNuisance(channel))
+
+    @property
+    def gains_db(self) -> dict[str, float]:
+        """Gain of every channel fitted."""
+        return {c.channel: c.gain_db for c in self.channels}
+
+
+def apply(nuisance: Nuisance, simulated: Features) -> Features:
+    """Simulated features as the measuring chain would show them."""
+    old = simulated.levels
+    new = {name: getattr(old, name).copy() for name in ("level_db", "std_db", "height_db")}
+    for chain in nuisance.channels:
+        rows = np.array([place.channel == chain.channel for place in simulated.places])
+        power = rows & np.isfinite(old.frequency_hz) & np.isfinite(old.level_db)
+        _shift_power(old, new, power, chain)
+        _shift_rest(simulated, new, rows, chain)
+    levels = Levels(
+        new["level_db"],
+        np.maximum(new["std_db"], LEAST_STD_DB),
+        new["height_db"],
+        old.clear_db,
+        old.frequency_hz,
+        old.bandwidth_hz,
+        old.gauss_db,
+    )
+    return Features(simulated.places, levels, simulated.speed_hz)
+
+
+def _mixed(
+    old: Levels, new: dict[str, Vector], rows: NDArray[np.bool_], factor: Vector, added: Vector
+) -> None:
+    """Levels of X' = factor X + added, and the same for what noise alone gives of them."""
+    value = factor * 10 ** (0.1 * old.level_db[rows])
+    noise = value * 10 ** (-0.1 * old.height_db[rows])
+    total = np.maximum(value + added, _TINY)
+    new["level_db"][rows] = 10 * np.log10(total)
+    new["std_db"][rows] = old.std_db[rows] * value / total
+    alone = np.where(np.isinf(old.height_db[rows]), 0.0, np.maximum(noise + added, _TINY))
+    with np.errstate(divide="ignore"):
+        new["height_db"][rows] = 10 * np.log10(total / alone)
+
+
+def _shift_power(
+    old: Levels, new: dict[str, Vector], rows: NDArray[np.bool_], chain: ChannelNuisance
+) -> None:
+    hz, width = old.frequency_hz[rows], old.bandwidth_hz[rows]
+    _mixed(old, new, rows, chain.gain(hz), chain.floor(hz) * width)
+
+
+def _shift_rest(
+    simulated: Features, new: dict[str, Vector], rows: NDArray[np.bool_], chain: ChannelNuisance
+) -> None:
+    """Level of the whole channel, and what noise dilutes: modulations, coherence, shapes."""
+    old = simulated.levels
+    shares = {band: _Mixture.of(simulated, rows, chain, band) for band in _bands(simulated, rows)}
+    for k in np.flatnonzero(rows & np.isfinite(old.level_db) & ~np.isfinite(old.frequency_hz)).tolist():
+        place = simulated.places[k]
+        one = np.zeros(rows.size, dtype=np.bool_)
+        one[k] = True
+        if place.kind == "rms":
+            mixture = _Mixture.of(simulated, rows, chain, None)
+            before = max(10 ** (0.1 * float(old.level_db[k])), _TINY)
+            _mixed(old, new, one, np.array([mixture.model / before]), np.array([mixture.noise]))
+        elif math.isfinite(old.gauss_db[k]) and place.band_hz in shares:
+            factor, rest = shares[place.band_hz].dilution(place)
+            _mixed(old, new, one, np.array([factor]), np.array([rest * 10 ** (0.1 * old.gauss_db[k])]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Mixture:
+    """Power of model and noise in a band, and two means that depend on how they lie in it."""
+
+    model: float
+    noise: float
+    concentration: float
+    coherent: float
+
+    @classmethod
+    def of(
+        cls,
+        simulated: Features,
+        rows: NDArray[np.bool_],
+        chain: ChannelNuisance,
+        band: tuple[float, float] | None,
+    ) -> _Mixture:
+        """Of a carrier band, or (None) of the whole channel; colours from the noise bands of the psd."""
+        places, levels = simulated.places, simulated.levels
+        level = next(
+            float(levels.level_db[k])
+            for k in np.flatnonzero(rows).tolist()
+            if places[k].kind == "rms" and places[k].band_hz == band
+        )
+        inside = [
+            k
+            for k in np.flatnonzero(rows & np.isfinite(levels.level_db)).tolist()
+            if places[k].domain == "psd" and (band is None or band[0] <= places[k].at < band[1])
+        ]
+        if not inside:
+            hz = np.array([1.0 if band is None else math.sqrt(band[0] * band[1])])
+            width = np.array([1.0 if band is None else band[1] - band[0]])
+            density = 10 ** (0.1 * level) / width
+        else:
+            hz = levels.frequency_hz[inside]
+            width = np.array([places[k].width for k in inside])
+            density = 10 ** (0.1 * levels.level_db[inside])
+            # Lines are spread like the noise around them; below the lowest band they are passed as they are.
+            density = density * (10 ** (0.1 * level) / max(float(np.sum(density * width)), _TINY))
+        model, noise = chain.gain(hz) * density, chain.floor(hz)
+        both = np.maximum(model + noise, _TINY)
+        total, extent = float(np.sum(both * width)), float(np.sum(width))
+        crossed = extent * float(np.sum((both**2 - model**2) * width)) / total**2
+        coherent = float(np.sum((model / both) ** 2 * width)) / extent
+        return cls(float(np.sum(model * width)), float(np.sum(noise * width)), crossed, coherent)
+
+    def dilution(self, place: Place) -> tuple[float, float]:
+        """Factor of what the model has, and share of what Gaussian noise would have."""
+        share = self.model / max(self.model + self.noise, _TINY)
+        if place.kind in _FIRST_ORDER_KINDS:
+            return share, 1 - share
+        if place.domain == "cyclic":
+            return self.coherent, 1 - self.coherent
+        return share**2, self.concentration if place.domain == "envelope" else 1 - share**2
+
+
+def _bands(simulated: Features, rows: NDArray[np.bool_]) -> set[tuple[float, float] | None]:
+    """Bands of a channel whose power is known; None for all frequencies."""
+    return {simulated.places[k].band_hz for k in np.flatnonzero(rows) if simulated.places[k].kind == "rms"}

@@ -1,0 +1,185 @@
+"""Places that differ together, merged into discrepancies that a person can read.
+
+Places are one discrepancy when they differ in the same direction and belong to the same thing: lines of one
+mesh, one family or one shaft in whatever channel and band, neighbouring bands of noise, one figure.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsim_twin.compare.discrepancy import Comparison, pooled, significant
+from gearsim_twin.compare.places import Place, band_text, hz_text
+
+__all__ = ["Discrepancy", "discrepancies"]
+
+_MOST_CHANNELS = 3
+_GAP = 1  # bands between two that differ
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancy:
+    """Something that the simulation gets wrong.
+
+    Attributes
+    ----------
+    id : str
+    domain : str
+    where : str
+        In plain words.
+    size_db : float
+        Measured minus simulated, weighted mean over its places.
+    z : float
+        Of the place that is surest.
+    places : tuple of Place
+        The surest first.
+    explained_by : str or None
+        Cause that takes it away; None while there is none.
+    """
+
+    id: str
+    domain: str
+    where: str
+    size_db: float
+    z: float
+    places: tuple[Place, ...]
+    explained_by: str | None = None
+
+    def words(self) -> str:
+        """What is wrong, for people."""
+        if self.places[0].kind == "ratio":
+            return f"{self.where}: not where the model has it"
+        side = "above" if self.size_db > 0 else "below"
+        return f"{self.where}: measured {abs(self.size_db):.1f} dB {side} the model"
+
+    def explained(self, cause: str | None) -> Discrepancy:
+        """The same with its cause."""
+        return replace(self, explained_by=cause)
+
+    def to_json(self) -> dict[str, object]:
+        """As in `twin --json`."""
+        return {
+            "id": self.id,
+            "domain": self.domain,
+            "where": self.where,
+            "size_db": round(self.size_db, 3),
+            "z": round(self.z, 2),
+            "explained_by": self.explained_by,
+        }
+
+
+def discrepancies(comparisons: Sequence[Comparison], false_share: float = 0.01) -> tuple[Discrepancy, ...]:
+    """What differs for certain between records and their simulations, the surest first.
+
+    Parameters
+    ----------
+    comparisons : sequence of Comparison
+        One per record, at the same places.
+    false_share : float
+        Share of places told that may differ by chance.
+    """
+    both = pooled(comparisons)
+    found = significant(both, false_share)
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for key, k in _keys(both, np.flatnonzero(found).tolist()):
+        groups.setdefault(key, []).append(k)
+    rows = [sorted(rows, key=lambda k: -abs(both.z[k])) for rows in groups.values()]
+    rows.sort(key=lambda group: -abs(both.z[group[0]]))
+    return tuple(_one(both, group, number) for number, group in enumerate(rows, start=1))
+
+
+def _keys(both: Comparison, rows: Sequence[int]) -> Iterator[tuple[tuple[object, ...], int]]:
+    """What each place belongs to."""
+    run, last = 0, (-10, "", False)
+    for k in rows:
+        place = both.places[k]
+        up = bool(both.difference_db[k] > 0)
+        if place.domain == "psd":
+            together = k - last[0] <= 1 + _GAP and (place.channel, up) == last[1:]
+            run = run if together else run + 1
+            last = (k, place.channel, up)
+            yield ("psd", run), k
+        else:
+            yield (place.domain, _thing(place), up), k
+
+
+def _thing(place: Place) -> tuple[object, ...]:
+    if place.domain == "statistics":
+        return (place.kind,)
+    if place.domain == "transient":
+        return (place.kind, place.label)
+    if place.kind == "ratio":
+        return ("ratio", place.label)
+    if place.kind in ("tone", "floor", "half"):
+        channel = place.channel if place.kind == "floor" else ""
+        return (
+            place.kind,
+            channel,
+            place.unit,
+            round(place.at / max(place.width, 1e-9)) if not channel else 0,
+        )
+    channel = place.channel if place.domain == "torsional" else ""
+    return (channel, base(place.label))
+
+
+def base(label: str) -> str:
+    """What a line belongs to: "2 x mesh gears +1 x input" is of "mesh gears"."""
+    plain = re.sub(r"^[\d.]+ x (?!\D*\bHz\b)", "", label)
+    return re.sub(r" [+-]\d+ x .*$", "", plain)
+
+
+def _one(both: Comparison, rows: list[int], number: int) -> Discrepancy:
+    places = tuple(both.places[k] for k in rows)
+    weight = 1 / both.std_db[rows] ** 2
+    size = float(np.sum(weight * both.difference_db[rows]) / np.sum(weight))
+    z = float(both.z[rows[0]])
+    return Discrepancy(f"d{number}", places[0].domain, _where(places, both.speed_hz), size, z, places)
+
+
+def _where(places: tuple[Place, ...], speed_hz: float) -> str:
+    first = places[0]
+    channels = _listed(list(dict.fromkeys(p.channel for p in places)))
+    if first.domain == "psd":
+        low = min(p.at - 0.5 * p.width for p in places)
+        high = max(p.at + 0.5 * p.width for p in places)
+        return f"noise from {hz_text(low)} to {hz_text(high)} of {channels}"
+    if first.domain in ("statistics", "transient") or first.kind in ("floor", "ratio"):
+        return f"{first.what(speed_hz)}{_bands(places)} of {channels}"
+    if first.domain == "torsional":
+        return f"{_lines(places, speed_hz)} of the encoder of {channels}"
+    place = {"envelope": f" in the envelope{_bands(places)}", "cyclic": f" in the coherence{_bands(places)}"}
+    return f"{_lines(places, speed_hz)}{place.get(first.domain, '')} of {channels}"
+
+
+def _lines(places: tuple[Place, ...], speed_hz: float) -> str:
+    """ "lines at 48.4 Hz and multiples (BPFO of bearing_3)"."""
+    first = places[0]
+    lowest = min(places, key=lambda p: p.at)
+    hz = lowest.hz(speed_hz)
+    at = hz_text(hz) if hz == hz else f"order {lowest.at:.4g}"
+    orders = {round(p.at, 6) for p in places}
+    if len(orders) == 1:
+        name = f" ({first.label})" if first.label and first.label != "tone" else ""
+        return f"line at {at}{name}"
+    count = sum(1 for order in orders if abs(order / lowest.at - round(order / lowest.at)) < 0.01)
+    more = "and multiples" if count == len(orders) else f"and {len(orders) - 1} more"
+    return f"lines at {at} {more} ({base(first.label)})"
+
+
+def _bands(places: tuple[Place, ...]) -> str:
+    bands = list(dict.fromkeys(p.band_hz for p in places if p.band_hz is not None))
+    if not bands:
+        return ""
+    if len(bands) == 1:
+        return f" of the {band_text(bands[0])} band"
+    return f" of {len(bands)} bands ({band_text(bands[0])} most)"
+
+
+def _listed(names: list[str]) -> str:
+    if len(names) <= _MOST_CHANNELS:
+        return ", ".join(names)
+    return f"{', '.join(names[:_MOST_CHANNELS])} and {len(names) - _MOST_CHANNELS} more channels"
