@@ -11,6 +11,7 @@ import pytest
 from rig_records import RATE_HZ, case_of, parallel_record, rig_record, turning
 
 from gearsim_io.errors import InputError
+from gearsim_io.machines import machine_file
 from gearsim_io.record import Record
 from gearsim_twin.case import least_seconds, load_case
 from gearsim_twin.recordings import cut, same_recording, thinned
@@ -166,6 +167,12 @@ def test_bags_and_files_give_the_same_case(tmp_path: Path):
     of_file = load_case([file], "unsw_parallel", "lpm34")
     assert of_bag.channels == of_file.channels
     assert np.array_equal(of_bag.training[0].data, of_file.training[0].data)
+    assert not any("nameplate" in remark for remark in of_bag.remarks)
+    own = tmp_path / "mine.yaml"
+    text = machine_file("unsw_parallel").read_text(encoding="utf-8")
+    own.write_text(text.replace("value: 7.12, unit: mm", "value: 7.00, unit: mm"), encoding="utf-8")
+    remarks = load_case([bag], own, "lpm34").remarks
+    assert any("nameplate in the bag has other bearings than the description" in one for one in remarks)
     with pytest.raises(InputError, match="once more"):
         load_case([bag], "unsw_parallel", "lpm34", holdout=[file])
     with pytest.raises(InputError, match=r"--holdout: .*got the recording .*bag of MEASURED once more"):

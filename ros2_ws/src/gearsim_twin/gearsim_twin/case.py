@@ -13,11 +13,11 @@ from pathlib import Path
 
 from gearsim_dsp.features import is_signal
 from gearsim_dsp.kinematics import bearing_orders
-from gearsim_io.bags.records import is_bag, read_record
+from gearsim_io.bags.records import is_bag, read_machine, read_record
 from gearsim_io.errors import InputError
 from gearsim_io.importers import Overrides, import_file, machine_for
 from gearsim_io.machines import load_machine, machine_file
-from gearsim_io.nameplate import Machine
+from gearsim_io.nameplate import Bearing, Machine
 from gearsim_io.record import Record
 from gearsim_twin.modelled import Modelled, describe
 from gearsim_twin.recordings import cut, only, same_recording, thinned
@@ -139,9 +139,11 @@ def load_case(
     read = {
         option: tuple(_read(Path(one), path, overrides) for one in files) for option, files in groups.items()
     }
-    return make_case(
+    case = make_case(
         plate, path, model, read["MEASURED"], read["--healthy"], read["--holdout"], modelled=modelled
     )
+    bags = [Path(one) for files in groups.values() for one in files if is_bag(one)]
+    return replace(case, remarks=(*case.remarks, *_other_nameplates(bags, plate)))
 
 
 def make_case(
@@ -223,6 +225,32 @@ def _read(path: Path, machine_path: Path, overrides: Overrides | None) -> Record
     if overrides is not None and overrides.speed_hz is not None:
         return replace(record, notes={**record.notes, "speed_hz": f"{overrides.speed_hz:.9g}"})
     return record
+
+
+def _other_nameplates(bags: Sequence[Path], plate: Machine) -> tuple[str, ...]:
+    """What the nameplates that bags carry say against the description."""
+    remarks = []
+    for bag in bags:
+        own = read_machine(bag)
+        if own is None:
+            continue
+        parts = {"name": (own.name, plate.name), "bearings": (_geometry(own), _geometry(plate))}
+        parts["gears"] = (
+            (own.gear_meshes, own.planetary_stages),
+            (plate.gear_meshes, plate.planetary_stages),
+        )
+        told = [name for name, (one, other) in parts.items() if one != other]
+        if told:
+            words = " and ".join(told)
+            remarks.append(
+                f"{bag}: the nameplate in the bag has other {words} than the description of {plate.name}"
+            )
+    return tuple(remarks)
+
+
+def _geometry(machine: Machine) -> tuple[Bearing, ...]:
+    """The bearings; which channels are near is a matter of the sensors of a run."""
+    return tuple(replace(bearing, channels=()) for bearing in machine.bearings)
 
 
 def _check_files(groups: dict[str, Sequence[Path | str]]) -> None:

@@ -21,6 +21,7 @@ from gearsim_dsp.noise_floor import effective_averages
 from gearsim_dsp.quality import QualityIssue, check_levels
 from gearsim_dsp.speed import Phase, ShaftSpeed, SpeedSource
 from gearsim_dsp.speed_estimate import estimate_speed
+from gearsim_dsp.stated_rate import doubt_of_rate
 from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
@@ -213,4 +214,6 @@ def _issues(
             f"{speed.value_hz:.5g} Hz ({speed.source}) is {percent:+.3g} % off the {nominal:.5g} Hz stated"
         )
         issues.append(QualityIssue("speed_off_nameplate", "", detail))
+    rate = doubt_of_rate(record, machine, speed)
+    issues += [rate] if rate is not None else []
     return (*issues, *check_levels(record, machine))
