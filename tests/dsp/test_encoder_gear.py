@@ -5,7 +5,9 @@ import pytest
 from judge_signals import RATE_HZ, edges, gearbox, measured, mesh, steady, turns
 from scipy.signal import lfilter
 
+from gearsim_dsp.judges.combine import all_findings
 from gearsim_dsp.judges.encoder_gear import spall_probability, stands_out
+from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.judges.gear import judge_gears
 from gearsim_dsp.judges.shaft import shaken_shafts
 from gearsim_dsp.judges.tooth_errors import tooth_errors
@@ -130,3 +132,11 @@ def test_a_shaft_that_shakes_all_round_is_no_fault_of_its_wheel():
     assert shaken_shafts(shaken) == {"input"}
     assert shaken_shafts(still) == set()
     assert judge_gears(shaken) == ()
+
+
+@pytest.mark.parametrize(("confidence", "wear"), [(0.9, False), (0.2, True)])
+def test_beside_a_bearing_that_is_surely_bad_nothing_is_said_of_wear(confidence, wear):
+    bearing = Finding("bearing_1", "inner_race", 5.4, 5.4, 108.0, 20.0, confidence, "moderate", "in_y")
+    found = all_findings(box_of(trains(1, worn="input")), (bearing,))
+    assert ("gear_wear" in [one.fault for one in found]) is wear
+    assert "inner_race" in [one.fault for one in found]
