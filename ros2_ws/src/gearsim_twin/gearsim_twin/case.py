@@ -6,7 +6,6 @@ All input that cannot be judged is refused here, in words that say what would do
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from gearsim_io.importers import Overrides, import_file, machine_for
 from gearsim_io.machines import load_machine, machine_file
 from gearsim_io.nameplate import Bearing, Machine
 from gearsim_io.record import Record
+from gearsim_twin.given import HEALTHY, HELD_OUT, MEASURED, check_given, stands_twice
 from gearsim_twin.modelled import Modelled, describe
 from gearsim_twin.recordings import cut, only, same_recording, thinned
 from gearsim_twin.view import View, view_of
@@ -131,17 +131,15 @@ def load_case(
     InputError
         As `make_case`, or if a file is not there, cannot be read, or is given twice.
     """
+    groups = {MEASURED: measured, HELD_OUT: holdout, HEALTHY: healthy}
+    check_given(groups, machine, model)
     path = machine_file(machine)
     plate = load_machine(path)
     modelled = describe(path, model)
-    groups = {"MEASURED": measured, "--holdout": holdout, "--healthy": healthy}
-    _check_files(groups)
     read = {
         option: tuple(_read(Path(one), path, overrides) for one in files) for option, files in groups.items()
     }
-    case = make_case(
-        plate, path, model, read["MEASURED"], read["--healthy"], read["--holdout"], modelled=modelled
-    )
+    case = make_case(plate, path, model, read[MEASURED], read[HEALTHY], read[HELD_OUT], modelled=modelled)
     bags = [Path(one) for files in groups.values() for one in files if is_bag(one)]
     return replace(case, remarks=(*case.remarks, *_other_nameplates(bags, plate)))
 
@@ -169,16 +167,16 @@ def make_case(
         each other, a record is too short, or one recording stands in two places.
     """
     modelled = modelled or describe(machine_path, model)
-    groups = {"MEASURED": tuple(measured), "--holdout": tuple(holdout), "--healthy": tuple(healthy)}
-    if not groups["MEASURED"]:
-        raise InputError("twin", "MEASURED", "no record", "at least one bag or measured file")
+    groups = {MEASURED: tuple(measured), HELD_OUT: tuple(holdout), HEALTHY: tuple(healthy)}
+    if not groups[MEASURED]:
+        raise InputError("twin", MEASURED, "no record", "at least one bag or measured file")
     remarks: list[str] = []
     groups = _one_rate(groups, remarks)
     groups = _one_unit(groups, remarks)
     originals = tuple(record for records in groups.values() for record in records)
     groups = _one_set_of_channels(groups, machine, modelled, model, remarks)
     _check_distinct(groups)
-    training, held = groups["MEASURED"], groups["--holdout"]
+    training, held = groups[MEASURED], groups[HELD_OUT]
     split = not held
     if held:
         for record in (*training, *held):
@@ -188,7 +186,7 @@ def make_case(
             _check_length(record, machine, _HELD_OUT_SHARE)
         training, held = zip(*(_split(record) for record in training), strict=True)
         remarks.append("no held-out record was given: the last third of each record is held out")
-    for record in groups["--healthy"]:
+    for record in groups[HEALTHY]:
         _check_length(record, machine, 1)
     return Case(
         machine=machine,
@@ -196,7 +194,7 @@ def make_case(
         model=model,
         training=training,
         holdout=held,
-        healthy=groups["--healthy"],
+        healthy=groups[HEALTHY],
         split=split,
         modelled=modelled,
         remarks=tuple(remarks),
@@ -217,8 +215,6 @@ Groups = dict[str, tuple[Record, ...]]
 
 
 def _read(path: Path, machine_path: Path, overrides: Overrides | None) -> Record:
-    if not path.exists():
-        raise InputError(str(path), "", "nothing there", "a bag or a measured file")
     if not is_bag(path):
         return import_file(path, machine_path, overrides)
     record = read_record(path)
@@ -253,34 +249,13 @@ def _geometry(machine: Machine) -> tuple[Bearing, ...]:
     return tuple(replace(bearing, channels=()) for bearing in machine.bearings)
 
 
-def _check_files(groups: dict[str, Sequence[Path | str]]) -> None:
-    """One file in two places is told before anything long is read."""
-    seen: list[tuple[str, Path]] = []
-    for option, files in groups.items():
-        for path in map(Path, files):
-            for other, known in seen:
-                if path.exists() and known.exists() and os.path.samefile(path, known):
-                    raise _twice(option, str(path), other, str(known))
-            seen.append((option, path))
-
-
-def _twice(option: str, name: str, other: str, known: str) -> InputError:
-    expected = {
-        "--holdout": "a recording that nothing is fitted to; without --holdout a third of each is held out",
-        "--healthy": "a recording of the machine without the effect",
-        "MEASURED": "every recording once",
-    }[option]
-    place = f"the recording {known}" + (f" of {other}" if other != option else "") + " once more"
-    return InputError(option, name, place, expected)
-
-
 def _check_distinct(groups: Groups) -> None:
     seen: list[tuple[str, Record]] = []
     for option, records in groups.items():
         for record in records:
             for other, known in seen:
                 if same_recording(record, known):
-                    raise _twice(option, _name(record), other, _name(known))
+                    raise stands_twice(option, _name(record), other, _name(known))
             seen.append((option, record))
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import load_machine, machine_names, read_machine_file
+from gearsim_io.machines import load_machine, machine_file
 from gearsim_sim.models import MODELS, parameters
 from gearsim_sim.scenario import Scenario, parse_scenario
+from gearsim_twin.given import check_given, model_kind
 
-__all__ = ["Modelled", "describe", "fitting_models", "has_model_section"]
+__all__ = ["Modelled", "describe", "fitting_models"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +49,9 @@ def describe(machine: str | Path, model: str) -> Modelled:
         If there is no such model, the description has no section `model`, or the model is of another kind of
         machine: with the names that would do.
     """
-    if model not in MODELS:
-        raise InputError("--model", "", model, "one of " + ", ".join(sorted(MODELS)))
-    path, content = read_machine_file(machine)
-    section = content.get("model")
-    if section is None or not has_model_section(content):
-        able = ", ".join(name for name in machine_names() if has_model_section(read_machine_file(name)[1]))
-        expected = (
-            "a section `model` with masses, stiffnesses and dampers, without which nothing can be simulated "
-            f"(docs/rigs.md; the machines {able} have one); `gearsim diagnose` needs none"
-        )
-        raise InputError(str(path), "model", "nothing", expected)
+    path = machine_file(machine)
+    kind = model_kind(path)
+    check_given({}, path, model)
     try:
         scenario = _scenario(path, model)
         params = parameters(scenario)
@@ -69,14 +60,14 @@ def describe(machine: str | Path, model: str) -> Modelled:
         if model in others:
             raise
         if others:
-            expected = f"a model that describes {content.get('name')}: one of " + ", ".join(others)
+            expected = f"a model that describes {load_machine(path).name}: one of " + ", ".join(others)
             raise InputError("--model", "", model, expected) from None
         raise InputError(error.where, error.field, error.value, error.expected) from None
     from gearsim_sim.model.plants import make_plant  # here, because a refusal need not wait for it
 
     plant = make_plant(params, scenario.seed)
     return Modelled(
-        kind=str(section["kind"]),
+        kind=kind,
         sites=tuple(plant.sites),
         torque_shafts=tuple(name.removesuffix("_torque") for name in plant.signals if "_torque" in name),
         tacho_shafts=tuple(plant.encoders),
@@ -95,12 +86,6 @@ def fitting_models(machine: str | Path) -> tuple[str, ...]:
             continue
         found.append(name)
     return tuple(found)
-
-
-def has_model_section(content: Mapping[str, Any]) -> bool:
-    """Whether the content of a machine file has what a simulation needs at all."""
-    section = content.get("model")
-    return isinstance(section, Mapping) and "kind" in section
 
 
 def _scenario(path: Path, model: str) -> Scenario:
