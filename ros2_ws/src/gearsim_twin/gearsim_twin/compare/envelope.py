@@ -253,6 +253,8 @@ def _ratios(material: Material, channel: str, chosen: Sequence[Place]) -> Levels
         )
         if math.isfinite(found.order):
             level[k] = 100 * math.log(found.order / family.order)
-            std[k] = 100 * found.std / found.order
+            # What is not known of the speed is not known of the order: half an interval is 1.96 deviations.
+            doubt = material.view.speed.relative_error / 1.96
+            std[k] = 100 * math.hypot(found.std / found.order, doubt)
             height[k] = found.height_db
     return Levels.of(level, std, height_db=height)

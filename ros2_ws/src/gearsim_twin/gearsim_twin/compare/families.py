@@ -8,6 +8,7 @@ the phases of its lines in consecutive windows: how they advance on average, and
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +18,7 @@ from scipy import fft as sfft
 
 from gearsim_dsp.comb import comb_grid, score_combs
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
-from gearsim_twin.compare.frame import Family
+from gearsim_twin.compare.frame import Family, Frame
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.windows import hann
 
@@ -29,6 +30,8 @@ _FLOOR_LINES, _FLOOR_SHARE = 160, 0.45
 _LOOKS_PER_CELL = 0.5
 _PEAK_RATIO = 4.0
 _NEARLY = 0.7
+_SPREAD = 0.002
+_LEAST_CAGE = 10.0
 _HARMONICS = 4
 _SHAFT_HALF = 1.6
 # Lines nearby pull the phase: at 40 dB by a hundredth of a turn over a way of several windows.
@@ -66,12 +69,12 @@ class _Padded:
 
 
 def find(material: Material, channel: str, family: Family) -> Found:
-    """Search one family on one channel."""
-    key = ("found", channel, family.label)
+    """Where one family is on one channel."""
+    key = ("families", channel)
     kept = material._kept
     if key not in kept:
-        kept[key] = _find(material, channel, family)
-    return kept[key]  # type: ignore[return-value]
+        kept[key] = _find_all(material, channel)
+    return kept[key].get(family.label, _NOT)  # type: ignore[attr-defined, no-any-return]
 
 
 def places_of(material: Material, channel: str, family: Family, expected: float) -> float:
@@ -80,10 +83,41 @@ def places_of(material: Material, channel: str, family: Family, expected: float)
     return found.order if math.isfinite(found.order) else expected
 
 
-def _find(material: Material, channel: str, family: Family) -> Found:
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """The best comb of a family in one band."""
+
+    family: Family
+    score: float
+    height: float
+    band: int
+    order: float
+
+
+def _find_all(material: Material, channel: str) -> dict[str, Found]:
+    """All families of a channel, the clearest first; the lines of one are no evidence for another."""
+    found: dict[str, Found] = {}
+    left = list(material.frame.families)
+    explained: list[float] = []
+    while left:
+        best = max((_best(material, channel, f, explained) for f in left), key=lambda c: c.score)
+        if best.score <= 0:
+            break
+        left.remove(best.family)
+        result = _refined(material, channel, best.band, best.order)
+        off = abs(result.order / best.family.order - 1)
+        if not off < best.family.tolerance + material.frame.smear:
+            continue
+        found[best.family.label] = result
+        explained.append(result.order)
+    return found
+
+
+def _best(material: Material, channel: str, family: Family, explained: Sequence[float]) -> _Candidate:
+    """The best comb of a family; its score is 0 where noise would show as much."""
     frame = material.frame
-    seen: list[tuple[float, float, int, float]] = []
-    trials = 1.0
+    seen: list[_Candidate] = []
+    trials = float(len(frame.bands_hz))
     for band, band_hz in enumerate(frame.bands_hz):
         padded = _padded(material, channel, band_hz)
         if family.order * _HARMONICS / 2 > padded.ratio.size * padded.step:
@@ -92,22 +126,40 @@ def _find(material: Material, channel: str, family: Family) -> Found:
         grid = comb_grid(
             family.order, half, padded.step, padded.ratio.size, family.sideband_order, padded.resolution
         )
-        usable = _free_of_turns(material, padded)
+        usable = _free_of_turns(material, padded) & ~_lines_of(frame, padded, explained)
         scores = score_combs(padded.tail[None, :], usable, grid)
         k = int(np.argmax(scores.score[0]))
         looks = 1.0 + _LOOKS_PER_CELL * 2 * half * family.order * 8 / padded.resolution
-        trials = max(trials, looks)
+        score = float(scores.score[0, k])
+        if search_false_alarm(min(1.0, math.exp(-max(score, 0.0))), looks * trials) > _FALSE_ALARM:
+            continue
         comb = grid.harmonics[k]
         comb = comb[(comb >= 0) & usable[comb]]
-        height = float(np.mean(np.log(padded.ratio[comb]))) if comb.size else -math.inf
-        seen.append((float(scores.score[0, k]), height, band, float(grid.fundamentals[k])))
-    top = max((score for score, *_ in seen), default=0.0)
-    count = trials * len(frame.bands_hz)
-    if search_false_alarm(min(1.0, math.exp(-max(top, 0.0))), count) > _FALSE_ALARM:
-        return _NOT
+        first = grid.harmonics[k, 0]
+        if comb.size == 0 or (family.fault == "cage" and padded.ratio[first] < _LEAST_CAGE):
+            continue
+        height = float(np.mean(np.log(padded.ratio[comb])))
+        seen.append(_Candidate(family, score, height, band, float(grid.fundamentals[k])))
+    if not seen:
+        return _Candidate(family, 0.0, 0.0, 0, math.nan)
     # Without noise a family is clear in every band, and the scores, which are capped, tell no more.
-    _, _, band, order = max((s for s in seen if s[0] >= _NEARLY * top), key=lambda entry: entry[1])
-    return _refined(material, channel, band, order)
+    top = max(c.score for c in seen)
+    return max((c for c in seen if c.score >= _NEARLY * top), key=lambda c: c.height)
+
+
+def _lines_of(frame: Frame, padded: _Padded, explained: Sequence[float]) -> NDArray[np.bool_]:
+    """Lines of families that are found, with their sidebands of shafts and cages."""
+    order = np.arange(padded.ratio.size) * padded.step
+    lines = np.zeros(order.size, dtype=np.bool_)
+    turns = {shaft.ratio for shaft in frame.machine.shafts}
+    apart = turns | {2 * r for r in turns} | {f.order for f in frame.families if f.fault == "cage"}
+    shifts = {0.0} | apart | {-s for s in apart}
+    for fundamental in explained:
+        for shift in shifts:
+            number = np.maximum(1.0, np.round((order - shift) / fundamental))
+            width = _SHAFT_HALF * padded.resolution + _SPREAD * order
+            lines |= np.abs(order - shift - number * fundamental) < width
+    return lines
 
 
 def _padded(material: Material, channel: str, band_hz: tuple[float, float]) -> _Padded:

@@ -1,7 +1,8 @@
 """Sharp lines that belong to no shaft: supply, inverter, whirl, other machines, ball passes.
 
-A line over time is a shaft's if it is as strong over the angle and lies at a multiple of a shaft's turn
-there; what changes its frequency with the shaft is told from what does not by where the line is stronger.
+A line over time is a shaft's if it is as strong over the angle and lies at a multiple of a shaft's turn there.
+Low multiples and those near a mesh are compared anyway; others are told here with the shaft's name. What changes
+its frequency with the shaft is told from what does not by where the line is stronger.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from gearsim_dsp.angle.tracked_orders import all_mesh_orders
 from gearsim_dsp.noise_floor import LineTail
-from gearsim_twin.compare.frame import Frame
+from gearsim_io.nameplate import Machine
+from gearsim_twin.compare.families import find
 from gearsim_twin.compare.known_orders import nearest_turn
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.windows import WindowSpectra
@@ -26,7 +29,8 @@ _FALSE_ALARM = 1e-4
 _FLOOR_WORTH = 14.0  # 64 bins of 1.5 each, a third of them for the trimming
 _SHARP = 4.0  # a line's five bins hold four times what eight bins around them do
 _SHARE = 0.5
-_FAMILY_HARMONICS = 4
+_FAMILY_HARMONICS = 3
+_SHAFT_HARMONICS, _MESH_TURNS = 10, 5
 _SUPPLY_HZ = (50.0, 60.0)
 _SUPPLY_MULTIPLES = 20
 
@@ -68,28 +72,47 @@ def tones(material: Material, channel: str, top_order: float, count: int) -> lis
         hz = _refined(over_time.mean, k) * over_time.step
         if hz > frame.top_hz:
             break
-        if over_angle is not None and _is_turning(material, over_angle, over_time, hz, k):
+        turn = None if over_angle is None else _turn(material, over_angle, over_time, hz, k)
+        if turn is not None and _is_expected(frame.machine, hz / material.speed_hz):
             continue
-        found.append(Tone(hz, "Hz", _name(frame, hz, material.speed_hz), 10 * math.log10(ratio)))
+        name = _name(material, channel, hz, 1.5 * over_time.step)
+        if name is not None:
+            label = name if turn is None else f"{turn} or {name}" if "supply" in name else turn
+            found.append(Tone(hz, "Hz", label, 10 * math.log10(ratio)))
     if over_angle is not None:
-        found += _in_orders(material, over_angle, over_time)
+        found += _in_orders(material, channel, over_angle, over_time)
     return sorted(found, key=lambda tone: -tone.height_db)[:count]
 
 
-def _is_turning(
+def _turn(
     material: Material, over_angle: WindowSpectra, over_time: WindowSpectra, hz: float, k: int
-) -> bool:
-    """Whether a line over time is a shaft's."""
+) -> str | None:
+    """The multiple of a shaft that a line over time is, if it is one."""
     order = hz / material.speed_hz
     near = 1.5 * over_angle.step + 0.7 * over_time.step / material.speed_hz + 2 * material.frame.smear * order
-    if nearest_turn(material.frame.machine, order) > near:
-        return False
-    if (index := round(order / over_angle.step)) >= over_angle.power.shape[1] - 3:
-        return True  # beyond the orders looked at nothing tells
-    return _line(over_angle.mean, index, 3) >= _SHARE * _line(over_time.mean, k, 2)
+    machine = material.frame.machine
+    index = round(order / over_angle.step)
+    inside = index < over_angle.power.shape[1] - 3
+    if nearest_turn(machine, order) > near:
+        return None
+    if inside and _line(over_angle.mean, index, 3) < _SHARE * _line(over_time.mean, k, 2):
+        return None
+    shaft = min(machine.shafts, key=lambda s: abs(order - round(order / s.ratio) * s.ratio))
+    return f"{round(order / shaft.ratio)} x {shaft.name}"
 
 
-def _in_orders(material: Material, over_angle: WindowSpectra, over_time: WindowSpectra) -> list[Tone]:
+def _is_expected(machine: Machine, order: float) -> bool:
+    """Low harmonics of the shafts, and whatever lies within a few turns of a mesh harmonic."""
+    most = max(shaft.ratio for shaft in machine.shafts)
+    if order < (_SHAFT_HARMONICS + 0.5) * most:
+        return True
+    widest = (_MESH_TURNS + 0.5) * most
+    return any(abs(order - max(1, round(order / m)) * m) < widest for m in all_mesh_orders(machine))
+
+
+def _in_orders(
+    material: Material, channel: str, over_angle: WindowSpectra, over_time: WindowSpectra
+) -> list[Tone]:
     """Lines that are sharper over the angle and lie at no multiple of a turn."""
     frame = material.frame
     found = []
@@ -102,8 +125,9 @@ def _in_orders(material: Material, over_angle: WindowSpectra, over_time: WindowS
         inside = 3 <= index < over_time.power.shape[1] - 3
         if inside and _line(over_time.mean, index, 3) > 0.9 * _line(over_angle.mean, k, 2):
             continue  # as sharp over time: told there
-        label = _name(frame, order * material.speed_hz, material.speed_hz)
-        found.append(Tone(order, "order", label, 10 * math.log10(ratio)))
+        name = _name(material, channel, order * material.speed_hz, 1.5 * over_angle.step * material.speed_hz)
+        if name is not None:
+            found.append(Tone(order, "order", name, 10 * math.log10(ratio)))
     return found
 
 
@@ -118,16 +142,27 @@ def _refined(mean: NDArray[np.float64], k: int) -> float:
     return k + (0.5 * float(right - left) / float(bend) if bend > 0 else 0.0)
 
 
-def _name(frame: Frame, hz: float, speed_hz: float) -> str:
+def _name(material: Material, channel: str, hz: float, near_hz: float) -> str | None:
+    """What a line is; None for what belongs to a family that is found, beyond its first harmonics.
+
+    Impacts of a bearing bring a line at each of their harmonics, with sidebands of the shafts.
+    """
     for supply in _SUPPLY_HZ:
         multiple = round(hz / supply)
-        if 1 <= multiple <= _SUPPLY_MULTIPLES and abs(hz - multiple * supply) < 0.002 * hz:
+        if 1 <= multiple <= _SUPPLY_MULTIPLES and abs(hz - multiple * supply) < max(near_hz, 5e-4 * hz):
             return f"tone at {multiple} x {supply:g} Hz of a supply"
-    for family in frame.families:
-        harmonic = round(hz / (speed_hz * family.order))
-        off = abs(hz / (speed_hz * family.order) - harmonic)
-        if 1 <= harmonic <= _FAMILY_HARMONICS and off < family.tolerance * harmonic:
-            return f"{harmonic} x {family.label}"
+    frame = material.frame
+    turns = {0.0, *(shaft.ratio for shaft in frame.machine.shafts)}
+    for family in frame.families if frame.has_orders else ():
+        found = find(material, channel, family)
+        if not math.isfinite(found.order):
+            continue
+        for shift in turns | {-turn for turn in turns}:
+            order = hz / material.speed_hz - shift
+            number = max(1, round(order / found.order))
+            if abs(order - number * found.order) * material.speed_hz < near_hz + 2e-3 * hz:
+                own = shift == 0.0 and number <= _FAMILY_HARMONICS
+                return f"{number} x {family.label}" if own else None
     return "tone"
 
 
