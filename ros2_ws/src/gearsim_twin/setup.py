@@ -28,6 +28,7 @@ setup(
     install_requires=[
         "numpy>=1.26",
         "scipy>=1.11",
+        "ruamel.yaml>=0.18",
         "pydantic>=2",
         f"gearsim_io=={VERSION}",
         f"gearsim_sim=={VERSION}",

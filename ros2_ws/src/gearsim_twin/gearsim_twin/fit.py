@@ -60,7 +60,7 @@ def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
     """The model tuned to the training records, with the slopes of the knobs."""
     start = np.array(model.knobs, dtype=np.float64)
     steps = np.where(start > 0, -_TUNING_STEP, _TUNING_STEP) * np.eye(start.size)
-    trials = bench.trials([model, *(model.tuned(tuple(start + step)) for step in steps)])
+    trials = bench.trials([model, *(model.at(start + step) for step in steps)])
     slopes = _slopes(trials[0], trials[1:], np.diag(steps))
     best, value = trials[0], yard.value(trials[0].levels, start)
     for _ in range(_STEPS - 1):
@@ -68,7 +68,7 @@ def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
         step = _held(yard.posterior(best.levels, slopes, here).coordinates - here)
         if not step.size or float(np.max(np.abs(step))) < 0.1:
             break
-        (trial,) = bench.trials([model.tuned(tuple(here + step))])
+        (trial,) = bench.trials([model.at(here + step)])
         found = yard.value(trial.levels, here + step)
         if found <= value:
             break
@@ -160,8 +160,9 @@ def _step(parameter: Parameter, value: float, coordinate: float) -> float:
 
 
 def _slopes(trial: Trial, beside: list[Trial], steps: Array) -> Array:
+    """Differences of levels over steps, shape (n, steps); 0 where there is no level."""
     columns = [
-        (other.levels.level_db - trial.levels.level_db) / step
+        np.nan_to_num(other.levels.level_db - trial.levels.level_db) / step
         for other, step in zip(beside, steps, strict=True)
     ]
     return np.stack(columns, axis=1) if columns else np.zeros((trial.levels.level_db.size, 0))

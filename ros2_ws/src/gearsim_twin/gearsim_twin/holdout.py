@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Gain:
     domain : str
         Where the training records show the greatest difference between the two.
     gain_db : float
-        By how much the rms error falls there, dB.
+        By how much the rms error falls there, dB, weighted as by `score`.
     ci95_db : tuple of float
     nats : float
         Difference of the predictive log likelihoods over all domains.
@@ -74,15 +74,19 @@ def heldout_gain(
     shows at one place.
     """
     rng = np.random.default_rng(seed)
-    mine = yard.use & (yard.stack.domain == yard.stack.domains.index(domain))
+    either = replace(before[0], clear=before[0].clear | after[0].clear)
+    both = tuple((replace(levels, clear=either.clear), noise) for levels, noise in (before, after))
+    mine = np.isfinite(yard.residual(either)) & (yard.stack.domain == yard.stack.domains.index(domain))
+    weight = 1.0 / (1.0 + yard.variance(before[0])[mine])
+    weight /= max(float(weight.sum()), 1e-12)
     nats, falls = [], []
     for draw in range(_DRAWS + 1):
         error = _errors(yard, *after, rng) if draw else np.zeros(yard.stack.size)
         total, rms = [], []
-        for levels, noise in (before, after):
+        for levels, noise in both:
             residual = yard.residual(levels) + error
             total.append(float(yard.loglike(residual, yard.variance(levels), noise).sum()))
-            rms.append(float(np.sqrt(np.mean(residual[mine] ** 2))) if np.any(mine) else 0.0)
+            rms.append(float(np.sqrt(np.sum(weight * residual[mine] ** 2))))
         nats.append(total[1] - total[0])
         falls.append(rms[0] - rms[1])
     return Gain(domain, falls[0], _interval(falls), nats[0], _interval(nats))

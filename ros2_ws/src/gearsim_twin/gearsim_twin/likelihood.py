@@ -30,20 +30,26 @@ _NU = 5.0
 _T_CONST = float(gammaln((_NU + 1) / 2) - gammaln(_NU / 2) - 0.5 * np.log(_NU * np.pi))
 # What an unknown effect does to a level: from nothing to some 40 dB.
 WIDE_DB = 20.0
+# What is wholly absent is as wrong as it can be.
+MOST_DB = 40.0
 _OUTLYING = np.array([0.003, 0.01, 0.03, 0.1, 0.3])
-# What a tuned model of a gearbox still misses: 1 dB, known to a factor of 1.6 (measured on perturbed models).
-TAU_MEDIAN_DB, TAU_FACTOR = 1.0, 1.6
+# How levels at single places scatter about a tuned model and its smooth errors: half a dB, within 1.6.
+TAU_MEDIAN_DB, TAU_FACTOR = 0.5, 1.6
 _TAU_STEPS = np.linspace(-2.5, 3.0, 12)
 _ROUNDS, _NOISE_ROUNDS, _SAME = 10, 4, 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
-    """Per domain: spread of the model's own errors, share of outlying places, and log likelihood."""
+    """Per domain: spread of the model's own errors, share of outlying places, and log likelihood.
+
+    `quiet` is the log likelihood of all places where neither side has anything.
+    """
 
     tau_db: Array
     outlying: Array
     loglike: Array
+    quiet: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,23 +107,31 @@ class Yardstick:
         """The most probable tau and share of outlying places in each domain."""
         count = len(self.stack.domains)
         tau, outlying, best = np.zeros(count), np.zeros(count), np.zeros(count)
+        told = np.isfinite(residual_db)
         for d in range(count):
-            mine = self.use & (self.stack.domain == d)
+            mine = told & (self.stack.domain == d)
             grid = self.tau_median_db[d] * self.tau_factor[d] ** _TAU_STEPS
             core, wide = densities(residual_db[mine], variance_db2[mine] + grid[:, None] ** 2)
             terms = np.log(core[:, None] + _OUTLYING[:, None] * (wide - core)[:, None])
             value = self.share[d] * terms.sum(axis=-1) - 0.5 * _TAU_STEPS[:, None] ** 2
             k, m = np.unravel_index(int(np.argmax(value)), value.shape)
             tau[d], outlying[d], best[d] = grid[k], _OUTLYING[m], value[k, m]
-        return Noise(tau, outlying, best)
+        return Noise(tau, outlying, best, float(self._quiet(told).sum()))
 
     def loglike(self, residual_db: Array, variance_db2: Array, noise: Noise) -> Array:
         """Log likelihood of each place, times its share, shape (n,); 0 where a place does not count."""
+        told = np.isfinite(residual_db)
         s2 = variance_db2 + noise.tau_db[self.stack.domain] ** 2
-        core, wide = densities(residual_db, s2)
+        core, wide = densities(np.where(told, residual_db, 0.0), s2)
         outlying = noise.outlying[self.stack.domain]
         terms = np.log(core + outlying * (wide - core)) * self.share[self.stack.domain]
-        return np.asarray(np.where(self.use, terms, 0.0))
+        return np.where(told, terms, self._quiet(told))
+
+    def _quiet(self, told: np.ndarray) -> Array:
+        """Log likelihood of places where neither side has anything: they agree, whatever tau is."""
+        domain = self.stack.domain
+        s2 = np.where(self.use, self.stack.measured.std_db, 1.0) ** 2 + self.tau_median_db[domain] ** 2
+        return np.asarray(np.where(self.use & ~told, (_T_CONST - 0.5 * np.log(s2)) * self.share[domain], 0.0))
 
     def value(self, predicted: Levels, coordinates: Array) -> float:
         """Log likelihood of a prediction with the best smooth errors, and log priors, in nats."""
@@ -131,22 +145,25 @@ class Yardstick:
         """One step of the coordinates towards the measured levels, levels being linear in them."""
         start = self.residual(predicted)
         weight, _ = self._weights(start, self.variance(predicted), noise)
-        shift = self._shift(weight, slopes, start, coordinates)
+        shift = self._shift(weight, slopes, np.nan_to_num(start), coordinates)
         own = shift[: coordinates.size]
-        return Levels(predicted.level_db + slopes @ own, predicted.std_db), coordinates + own
+        return replace(predicted, level_db=predicted.level_db + slopes @ own), coordinates + own
 
     def residual(self, predicted: Levels) -> Array:
-        """Measured minus predicted, dB, shape (n,); 0 where a place does not count."""
-        return np.asarray(np.where(self.use, self.stack.measured.level_db - predicted.level_db, 0.0))
+        """Measured minus predicted, dB, shape (n,); NaN where nothing is to be compared."""
+        told = self.use & (self.stack.measured.clear | predicted.clear)
+        difference = np.where(told, self.stack.measured.level_db, 0.0) - predicted.level_db
+        return np.where(told, np.clip(difference, -MOST_DB, MOST_DB), np.nan)
 
     def variance(self, predicted: Levels) -> Array:
         """Sampling variance of both sides, dB^2, shape (n,)."""
-        return np.asarray(self.stack.measured.std_db**2 + predicted.std_db**2)
+        measured = np.where(self.use, self.stack.measured.std_db, 1.0)
+        return np.asarray(measured**2 + predicted.std_db**2)
 
     def z(self, residual_db: Array, predicted: Levels, noise: Noise) -> Array:
-        """Differences in standard deviations, shape (n,)."""
+        """Differences in standard deviations, shape (n,); 0 where there is none."""
         spread = np.sqrt(self.variance(predicted) + noise.tau_db[self.stack.domain] ** 2)
-        return np.asarray(residual_db / spread)
+        return np.asarray(np.nan_to_num(residual_db) / spread)
 
     def by_independence(self, residual_db: Array, predicted: Levels, noise: Noise) -> Yardstick:
         """The same with shares of independent differences as some residual shows them."""
@@ -155,7 +172,7 @@ class Yardstick:
         count = len(self.stack.domains)
         total = np.bincount(self.stack.domain[self.use], weights=part2[self.use], minlength=count)
         systematic = total / np.maximum(np.bincount(self.stack.domain[self.use], minlength=count), 1)
-        z = np.where(self.use, self.z(residual_db, predicted, noise), 0.0)
+        z = self.z(residual_db, predicted, noise)
         return replace(self, share=independent_share(self.stack, z, systematic))
 
     def posterior(self, predicted: Levels, slopes: Array, coordinates: Array) -> Posterior:
@@ -177,7 +194,7 @@ class Yardstick:
         for turn in range(_ROUNDS):
             noise = self.noise(residual, variance) if 0 < turn < _NOISE_ROUNDS else noise
             weight, _ = self._weights(residual, variance, noise)
-            shift = self._shift(weight, slopes, start, coordinates)
+            shift = self._shift(weight, slopes, np.nan_to_num(start), coordinates)
             residual = start - slopes @ shift[:count] - self.smooth @ shift[count:]
             if np.max(np.abs(shift - last), initial=0.0) < _SAME:
                 break
@@ -186,7 +203,7 @@ class Yardstick:
         _, information = self._weights(residual, variance, noise)
         normal = self._normal(information, slopes)
         everything = shift + np.concatenate([coordinates, np.zeros(shift.size - count)])
-        value = float(noise.loglike.sum()) - 0.5 * float(everything @ everything)
+        value = float(noise.loglike.sum()) + noise.quiet - 0.5 * float(everything @ everything)
         return Posterior(
             coordinates=everything[:count],
             covariance=np.asarray(np.linalg.inv(normal), dtype=np.float64)[:count, :count],
@@ -220,16 +237,16 @@ class Yardstick:
         The information is that of an M-estimator, (mean of psi')^2 / mean of psi^2 over each domain
         (Huber, Robust Statistics, 1981, 3.2), so that it holds however the differences are distributed.
         """
-        domain = self.stack.domain
+        domain, told = self.stack.domain, np.isfinite(residual_db)
         s2 = variance_db2 + noise.tau_db[domain] ** 2
-        z2 = residual_db**2 / s2
-        share = np.where(self.use, self.share[domain], 0.0)
+        z2 = np.nan_to_num(residual_db) ** 2 / s2
+        share = np.where(told, self.share[domain], 0.0)
         weight = share * (_NU + 1.0) / (_NU + z2) / s2
         psi2 = z2 * ((_NU + 1.0) / (_NU + z2)) ** 2
         bend = (_NU + 1.0) * (_NU - z2) / (_NU + z2) ** 2
         efficiency = np.zeros(len(self.stack.domains))
         for d in range(efficiency.size):
-            mine = self.use & (domain == d)
+            mine = told & (domain == d)
             if np.any(mine):
                 spread = max(float(np.mean(psi2[mine])), 0.1)
                 efficiency[d] = max(float(np.mean(bend[mine])), 0.05) ** 2 / spread

@@ -6,7 +6,7 @@ guess added. So one simulation tells how well the cause would do at any strength
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gearsim_twin.causes.context import Context
 from gearsim_twin.fit import Fitted
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.model import Extension
-from gearsim_twin.stack import Array, Levels
+from gearsim_twin.stack import Array
 from gearsim_twin.workbench import Trial, Workbench
 
 __all__ = ["Screened", "first_guesses", "screen"]
@@ -80,7 +80,7 @@ def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
     if trial.model.extensions[-1].cause.parameters:
         for strength in _STRENGTHS:
             power = np.maximum(below + strength * (above - below), 1e-3 * np.minimum(below, above))
-            candidates.append(Levels(10.0 * np.log10(power), trial.levels.std_db))
+            candidates.append(replace(trial.levels, level_db=10.0 * np.log10(power)))
     adapted = [yard.adapted(levels, base.slopes, base.at, noise) for levels in candidates]
     values = [
         float(yard.loglike(yard.residual(levels), yard.variance(levels), noise).sum()) - 0.5 * float(at @ at)

@@ -29,8 +29,12 @@ class Settings:
         of two that hide each other neither may be convincing alone.
     trifle_db : float
         Fall of the held-out rms error in the affected domain below which it is not worth a cause.
+    most_seconds : float
+        Longest simulation; beyond, it is no longer what limits the comparison.
     seed : int
-        Of the intervals of held-out gains.
+        Of simulations and of the intervals of held-out gains.
+    workers : int
+        Processes that simulate.
     """
 
     most_causes: int = 3
@@ -40,7 +44,9 @@ class Settings:
     doubt: float = 0.05
     hint_nats: float = -2.5
     trifle_db: float = 0.02
+    most_seconds: float = 5.0
     seed: int = 1
+    workers: int = 1
 
     @property
     def convincing_nats(self) -> float:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_twin.compare.discrepancy import RATIO_DB
+
 if TYPE_CHECKING:
     from gearsim_twin.compare.features import Features
     from gearsim_twin.compare.places import Place
@@ -17,8 +19,6 @@ __all__ = ["ASSUMED", "Assumed", "Levels", "Stack", "levels_of", "stack_of"]
 
 ASSUMED = "assumed"
 """Name of the domain of assumptions."""
-# A line off its place by the width at which lines no longer coincide counts as much as one too weak by half.
-_WIDTH_DB = 6.0
 _NO_RECORD = -1
 # Where only the measured record says something the model says that anything may be.
 SILENT_DB = 20.0
@@ -45,10 +45,19 @@ class Assumed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Levels:
-    """Levels at all places of a stack with their sampling standard deviations, dB, each of shape (n,)."""
+    """Levels at all places of a stack.
+
+    Attributes
+    ----------
+    level_db, std_db : ndarray, shape (n,)
+        With their sampling standard deviations.
+    clear : ndarray of bool, shape (n,)
+        Where the level is more than noise alone would give.
+    """
 
     level_db: Array
     std_db: Array
+    clear: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,15 +112,17 @@ class Stack:
         `corrections_db` has what the model needed of each assumption, in the order of `stack_of`.
         """
         level, std = self.measured.level_db.copy(), np.zeros(self.size)
+        clear = self.measured.clear.copy()
         for record, each in features.items():
             mine = self.record == record
             part = levels_of([each])
             silent = ~(np.isfinite(part.level_db) & np.isfinite(part.std_db))
             level[mine] = np.where(silent, level[mine], part.level_db)
             std[mine] = np.where(silent, SILENT_DB, part.std_db)
+            clear[mine] = part.clear
         if corrections_db:
             level[self.record == _NO_RECORD] = np.asarray(corrections_db, dtype=np.float64)
-        return Levels(level, std)
+        return Levels(level, std, clear)
 
 
 def _codes(keys: Sequence[Hashable]) -> Codes:
@@ -136,6 +147,7 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
         measured=Levels(
             np.concatenate([found.level_db, np.zeros(len(assumed))]),
             np.concatenate([found.std_db, np.array([each.std_db for each in assumed], dtype=np.float64)]),
+            np.concatenate([found.clear, np.ones(len(assumed), dtype=np.bool_)]),
         ),
         domains=names,
         record=record,
@@ -154,8 +166,9 @@ def levels_of(features: Sequence[Features]) -> Levels:
     return Levels(
         np.concatenate([empty, *(each.level_db for each in features)]) * scale,
         np.concatenate([empty, *(each.std_db for each in features)]) * scale,
+        np.concatenate([np.zeros(0, dtype=np.bool_), *(each.stands_out for each in features)]),
     )
 
 
 def _scale(place: Place) -> float:
-    return _WIDTH_DB / place.width if place.kind == "ratio" else 1.0
+    return RATIO_DB / place.width if place.kind == "ratio" else 1.0

@@ -30,12 +30,15 @@ class Setting:
     prior : LogNormal
         Of the factor on the numbers, around 1.
     numbers : tuple of (str, float, str)
-        Dotted name, value and unit of each as described.
+        Dotted name, value and unit of each.
+    calibrated : bool
+        Whether the values are no longer those of the description.
     """
 
     name: str
     prior: LogNormal
     numbers: tuple[tuple[str, float, str], ...]
+    calibrated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,7 @@ class Tuning:
     def apply(self, content: Content, coordinates: Sequence[float]) -> Content:
         """The scenario with the numbers scaled; those that are as described stay out of it."""
         for setting, u in zip(self.settings, coordinates, strict=True):
-            if u == 0.0:
+            if u == 0.0 and not setting.calibrated:
                 continue
             factor = setting.prior.value(u)
             for name, value, unit in setting.numbers:
@@ -62,7 +65,7 @@ class Tuning:
     def factors(self, coordinates: Sequence[float]) -> dict[str, float]:
         """Factor of each knob by name."""
         pairs = zip(self.settings, coordinates, strict=True)
-        return {setting.name: setting.prior.value(u) for setting, u in pairs}
+        return {setting.name: setting.prior.value(float(u)) for setting, u in pairs}
 
 
 def tuning_of(machine: str | Path, model: str) -> Tuning:

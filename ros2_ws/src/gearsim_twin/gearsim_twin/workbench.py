@@ -27,7 +27,9 @@ Job = tuple[int, Content]
 class Nuisances(Protocol):
     """How the measuring chain is accounted for."""
 
-    assumed: tuple[Assumed, ...]
+    @property
+    def assumed(self) -> tuple[Assumed, ...]:
+        """What is taken as known of it."""
 
     def fit(self, pairs: Sequence[tuple[Features, Features]]) -> Any:
         """The best nuisances for (measured, simulated) features of some records."""

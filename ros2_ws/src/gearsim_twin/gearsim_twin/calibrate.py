@@ -1,0 +1,99 @@
+"""What is known before the measured records are looked at: of the machine's numbers, and of a model's errors.
+
+Records of the healthy machine replace the plain assumptions by what they teach: the knobs start where they
+want them, known as well as they tell, and the spread of the model's own errors is the one found there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.fit import fit_tuning, judged
+from gearsim_twin.likelihood import TAU_FACTOR, TAU_MEDIAN_DB, Yardstick
+from gearsim_twin.model import Model
+from gearsim_twin.stack import ASSUMED
+from gearsim_twin.systematic import smooth_errors
+from gearsim_twin.tuning import Setting, Tuning
+from gearsim_twin.workbench import Workbench
+
+__all__ = ["Prior", "calibrated", "plain_prior"]
+
+SMOOTH_DB = 1.0
+"""Spread of smooth errors of a tuned model; single places scatter by `TAU_MEDIAN_DB` beyond."""
+_FIRST_SHARE = 0.3
+_NO_TAU_DB = 0.02
+# What one healthy machine tells is known no better than this: another day, another load.
+_LEAST_FACTOR, _LEARNT_TAU_FACTOR, _LESS_SURE = 1.02, 1.3, 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Knobs of the machine and errors of its model.
+
+    Attributes
+    ----------
+    tuning : Tuning
+    tau_db : dict of str to float
+        Spread of the model's errors by domain, as far as learnt.
+    """
+
+    tuning: Tuning
+    tau_db: dict[str, float]
+
+    def tau_of(self, domains: Sequence[str]) -> dict[str, float]:
+        """What a good model misses, smooth errors and scatter together, by domain."""
+        return {
+            name: float(np.hypot(SMOOTH_DB, self.tau_db.get(name, TAU_MEDIAN_DB)))
+            for name in domains
+            if name != ASSUMED
+        }
+
+    def yard(self, bench: Workbench) -> Yardstick:
+        """The measure of models on the training records of a bench."""
+        stack = bench.stack
+        use = stack.part((*bench.training, -1)) & stack.told
+        median = np.array([self._tau(name) for name in stack.domains])
+        learnt = [name in self.tau_db for name in stack.domains]
+        factor = np.where(learnt, _LEARNT_TAU_FACTOR, TAU_FACTOR)
+        share = np.array([1.0 if name == ASSUMED else _FIRST_SHARE for name in stack.domains])
+        spread = np.full(len(stack.domains), SMOOTH_DB)
+        return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread))
+
+    def _tau(self, domain: str) -> float:
+        return _NO_TAU_DB if domain == ASSUMED else self.tau_db.get(domain, TAU_MEDIAN_DB)
+
+
+def plain_prior(tuning: Tuning) -> Prior:
+    """What is assumed of any machine."""
+    return Prior(tuning, {})
+
+
+def calibrated(bench: Workbench, prior: Prior) -> Prior:
+    """What records of the healthy machine teach."""
+    yard = prior.yard(bench)
+    fitted = fit_tuning(bench, yard, Model(prior.tuning, prior.tuning.nominal))
+    levels = fitted.trial.levels
+    yard = yard.by_independence(fitted.posterior.residual_db, levels, fitted.posterior.noise)
+    fitted = judged(yard, fitted.trial, fitted.slopes)
+    spread = np.sqrt(np.diag(fitted.posterior.covariance))
+    settings = tuple(
+        _known(setting, float(u), float(std))
+        for setting, u, std in zip(prior.tuning.settings, fitted.at, spread, strict=True)
+    )
+    tau = zip(bench.stack.domains, fitted.posterior.noise.tau_db, strict=True)
+    return Prior(Tuning(settings), {name: float(value) for name, value in tau if name != ASSUMED})
+
+
+def _known(setting: Setting, coordinate: float, std: float) -> Setting:
+    """A knob around what was found, with its numbers as they are then."""
+    found = setting.prior.value(coordinate)
+    factor = max(setting.prior.factor ** (_LESS_SURE * std), _LEAST_FACTOR)
+    factor = min(factor, setting.prior.factor)
+    numbers = tuple((name, value * found, unit) for name, value, unit in setting.numbers)
+    return replace(
+        setting, prior=LogNormal(1.0, factor, factor**-3.0, factor**3.0), numbers=numbers, calibrated=True
+    )

@@ -1,0 +1,25 @@
+"""Differences without a cause, described: where, how large, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gearsim_twin.compare.merged import Discrepancy
+
+__all__ = ["describe_rest", "material"]
+
+_MOST = 6
+# A difference of a few decibels at one place is what models of machines err by.
+_LEAST_DB, _LEAST_Z = 3.0, 4.0
+
+
+def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
+    """Discrepancies that are too large and too sure for a good model's own errors, the surest first."""
+    return tuple(each for each in discrepancies if abs(each.size_db) >= _LEAST_DB and abs(each.z) >= _LEAST_Z)
+
+
+def describe_rest(rest: Sequence[Discrepancy]) -> str:
+    """The signature of what is left, in plain words with frequencies and orders."""
+    told = "; ".join(each.words() for each in rest[:_MOST])
+    more = len(rest) - _MOST
+    return told + (f"; and {more} more" if more > 0 else "")
