@@ -22,7 +22,7 @@ from gearsim_twin.compare.places import Place
 
 __all__ = ["measure", "places"]
 
-_PARTS = 12
+_PARTS, _FEWEST_PARTS = 12, 6
 _FIGURES = ("rms", "kurtosis", "crest", "asymmetry", "drift", "fluctuation", "quiet", "loud")
 _BLOCKS = 40
 _SCATTER_DB = 0.2
@@ -83,7 +83,7 @@ def _db(value: float) -> float:
 
 
 def _edges(material: Material, count: int, first: float, stride: float, most: int) -> NDArray[np.intp]:
-    """Where parts of a signal begin and the last one ends: `most`, of whole turns if they hold one each.
+    """Where parts of a signal begin and the last one ends: up to `most`, of whole turns if there are six.
 
     Sample i of the signal is sample `first` + i * `stride` of the record.
     """
@@ -92,10 +92,10 @@ def _edges(material: Material, count: int, first: float, stride: float, most: in
         return even
     turns = material.turns_at(first + stride * np.array([0.0, count - 1.0]))
     whole = math.floor(turns[1] - turns[0])
-    each = whole // most
-    if each < 1:
+    if whole < _FEWEST_PARTS:
         return even
-    marks = turns[0] + each * np.arange(most + 1)
+    each = -(-whole // most)
+    marks = turns[0] + each * np.arange(whole // each + 1)
     at = (np.interp(marks, material.phase.turns, material.phase.samples) - first) / stride
     return np.asarray(np.clip(np.round(at), 0, count), dtype=np.intp)
 
@@ -124,18 +124,18 @@ def _crest(square: NDArray[np.float64], edges: NDArray[np.intp]) -> tuple[float,
     each = 10 * np.log10(np.maximum(peaks, 1e-300) / max(float(square.mean()), 1e-300))
     # The largest of n Gaussian values is about sqrt(2 ln n) of them.
     gauss = 10 * math.log10(2 * math.log(max(square.size // _PARTS, 3)))
-    return float(each.mean()), max(float(each.std(ddof=1)) / math.sqrt(_PARTS), LEAST_STD_DB), gauss
+    return float(each.mean()), max(float(each.std(ddof=1)) / math.sqrt(each.size), LEAST_STD_DB), gauss
 
 
 def _steadiness(material: Material, square: NDArray[np.float64], kind: str) -> tuple[float, float]:
     """Drift, scatter and extremes of the level over short blocks, each a turn of the shaft or longer."""
-    turns = material.view.turns
-    count = int(np.clip(turns, 8, _BLOCKS)) if math.isfinite(turns) else _BLOCKS
-    edges = _edges(material, square.size, 0, 1.0, count)
+    edges = _edges(material, square.size, 0, 1.0, _BLOCKS)
     power = _means(edges, square)[:, 0]
     least = 1e-4 * float(power.mean())
     level = 10 * np.log10(np.maximum(power, least if least > 0 else 1e-300))
-    time = np.linspace(-0.5, 0.5, count)
+    count = power.size
+    time = 0.5 * (edges[1:] + edges[:-1]) / square.size
+    time = time - time.mean()
     slope = float(np.sum(time * level) / np.sum(time**2))
     rest = level - level.mean() - slope * time
     scatter = float(np.sqrt(np.sum(rest**2) / (count - 2)))

@@ -1,8 +1,8 @@
 """Sharp lines that belong to no shaft: supply, inverter, whirl, other machines, ball passes.
 
-A line over time is a shaft's if it is as strong over the angle and lies at a multiple of a shaft's turn there.
-Low multiples and those near a mesh are compared anyway; others are told here with the shaft's name. What changes
-its frequency with the shaft is told from what does not by where the line is stronger.
+A line over time is a shaft's if it is as strong over the angle and lies at a multiple of a shaft's turn
+there. Low multiples and those near a mesh are compared anyway; others are told here with the shaft's name.
+What changes its frequency with the shaft is told from what does not by where the line is stronger.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["Tone", "peaks_of", "tones"]
 
 _FALSE_ALARM = 1e-4
 _FLOOR_WORTH = 14.0  # 64 bins of 1.5 each, a third of them for the trimming
-_SHARP = 4.0  # a line's five bins hold four times what eight bins around them do
+_SHARP = 4.0  # a line's five bins hold four times what five such as those around them do
 _SHARE = 0.5
 _FAMILY_HARMONICS = 3
 _SHAFT_HARMONICS, _MESH_TURNS = 10, 5
@@ -52,12 +52,14 @@ def peaks_of(spectra: WindowSpectra, least_line: int = 4) -> tuple[NDArray[np.in
     averages = spectra.averages
     tail = LineTail(averages, averages * _FLOOR_WORTH)(ratio)
     peaks, _ = find_peaks(ratio, height=1.0, distance=3)
-    peaks = peaks[(peaks >= max(least_line, 7)) & (peaks < ratio.size - 7)]
+    peaks = peaks[(peaks >= least_line) & (peaks < ratio.size - 7)]
     peaks = peaks[tail[peaks] > math.log(ratio.size / _FALSE_ALARM)]
     around = np.array([*range(-6, -2), *range(3, 7)])
     line = mean[peaks[:, None] + np.arange(-2, 3)].sum(axis=1)
-    beside = mean[peaks[:, None] + around].sum(axis=1)
-    sharp = line > _SHARP * beside
+    # Below the first bins lies what is left of the mean.
+    index = peaks[:, None] + around
+    beside = np.nanmedian(np.where(index < 2, np.nan, mean[index]), axis=1)
+    sharp = line > _SHARP * 5 * beside
     return peaks[sharp], ratio[peaks[sharp]]
 
 
@@ -89,16 +91,18 @@ def _turn(
 ) -> str | None:
     """The multiple of a shaft that a line over time is, if it is one."""
     order = hz / material.speed_hz
-    near = 1.5 * over_angle.step + 0.7 * over_time.step / material.speed_hz + 2 * material.frame.smear * order
     machine = material.frame.machine
-    index = round(order / over_angle.step)
-    inside = index < over_angle.power.shape[1] - 3
-    if nearest_turn(machine, order) > near:
-        return None
-    if inside and _line(over_angle.mean, index, 3) < _SHARE * _line(over_time.mean, k, 2):
-        return None
+    # Between bins a line is placed to better than half of one.
+    near = 0.5 * over_time.step / material.speed_hz + 2 * material.frame.smear * order
     shaft = min(machine.shafts, key=lambda s: abs(order - round(order / s.ratio) * s.ratio))
-    return f"{round(order / shaft.ratio)} x {shaft.name}"
+    number = round(order / shaft.ratio)
+    if abs(order - number * shaft.ratio) > near:
+        return None
+    index = round(number * shaft.ratio / over_angle.step)
+    inside = index < over_angle.power.shape[1] - 3
+    if inside and _line(over_angle.mean, index, 2) < _SHARE * _line(over_time.mean, k, 2):
+        return None
+    return f"{number} x {shaft.name}"
 
 
 def _is_expected(machine: Machine, order: float) -> bool:

@@ -66,11 +66,22 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
 
 
 def _band(frame: Frame, channel: str, family: Family, materials: Sequence[Material]) -> tuple[float, float]:
-    """The band where the records show the family best; if none does, the one below the highest."""
-    found = [find(material, channel, family) for material in materials]
-    bands = [f.band for f in found if math.isfinite(f.order)]
+    """The band where the records have the family loudest; if none has it, the one below the highest."""
+    loudness = np.zeros(len(frame.bands_hz))
+    for material in materials:
+        found = find(material, channel, family)
+        if math.isfinite(found.order):
+            loudness += [_loudness(material, channel, band, found.order) for band in frame.bands_hz]
     usual = max(0, len(frame.bands_hz) - 2)
-    return frame.bands_hz[max(set(bands), key=bands.count) if bands else usual]
+    return frame.bands_hz[int(np.argmax(loudness)) if loudness.any() else usual]
+
+
+def _loudness(material: Material, channel: str, band: tuple[float, float], order: float) -> float:
+    """Power that a family modulates in a band."""
+    spectra = material.envelope_spectra(channel, band)
+    bins = [round(k * order / spectra.step) for k in (1, 2, 3)]
+    excess = sum(max(float(spectra.mean[b] - spectra.floor[b]), 0.0) for b in bins if b < spectra.floor.size)
+    return math.sqrt(excess) * float(material.envelope(channel, band).values.mean())
 
 
 def measure(material: Material, wanted: Sequence[Place]) -> Levels:
