@@ -54,7 +54,7 @@ def test_imports_go_one_way(package):
         assert rooms <= ALLOWED[package], f"{file} imports {sorted(rooms - ALLOWED[package])}"
 
 
-@pytest.mark.parametrize("package", ["gearsim_io", "gearsim_sim", "gearsim_dsp"])
+@pytest.mark.parametrize("package", ["gearsim_io", "gearsim_sim", "gearsim_dsp", "gearsim_twin"])
 def test_numerics_import_without_ros(package):
     names = modules(package)
     assert len(names) > 10

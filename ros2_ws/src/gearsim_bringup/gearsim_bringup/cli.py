@@ -34,6 +34,7 @@ COMMANDS = {
     "recover": "recover",
     "info": "info",
     "diagnose": "diagnose",
+    "twin": "twin",
     "view": "view",
     "monitoring": "monitoring",
     "bench": "bench",

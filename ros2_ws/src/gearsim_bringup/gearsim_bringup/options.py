@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +26,37 @@ class FiniteRange(click.FloatRange):
 FORMATS = ("mcap", "npz", "wav")  # that a run can be written in
 POSITIVE = FiniteRange(min=0, min_open=True)
 ANY_PATH = click.Path(path_type=Path)  # existence is checked where the error can say what was expected
+
+
+class SeveralValues(click.Command):
+    """A command whose options named in `several` take any number of values: `--holdout a.mat b.mat`."""
+
+    several: tuple[str, ...] = ()
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does, with the options written before each of their values."""
+        return super().parse_args(ctx, spread(args, self.several))
+
+
+def spread(words: Sequence[str], options: Sequence[str]) -> list[str]:
+    """Words of a command line with each of `options` written before every value that follows it.
+
+    Values end at the next option; after `--` nothing is changed.
+    """
+    result: list[str] = []
+    option, values = "", 0
+    for number, word in enumerate(words):
+        if word == "--":
+            return [*result, *words[number:]]
+        if word.startswith("-") and len(word) > 1:
+            name, told, _ = word.partition("=")
+            option, values = name if name in options else "", len(told)
+        else:
+            if option and values:
+                result.append(option)
+            values += 1
+        result.append(word)
+    return result
 
 
 def json_option(function: F) -> F:

@@ -222,6 +222,7 @@ def _with_tacho(content: Content, shaft: str) -> dict[str, Any]:
 
 def _done(work: tuple[_Task, Callable[[View], T]]) -> T:
     """In a worker: simulate, and make of it what is wanted."""
+    check_stop()
     task, then = work
     return then(task.view())
 

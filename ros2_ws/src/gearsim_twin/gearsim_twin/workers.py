@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
 
 __all__ = ["StoppedError", "WorkerLostError", "Workers", "check_stop"]
@@ -14,6 +15,7 @@ __all__ = ["StoppedError", "WorkerLostError", "Workers", "check_stop"]
 A = TypeVar("A")
 R = TypeVar("R")
 
+_PATIENCE_S = 1.0
 # The flag of this process, if it is a worker.
 _flag: Any = None
 
@@ -48,9 +50,9 @@ class Workers:
     """
 
     def __init__(self, count: int) -> None:
-        context = get_context("spawn")
-        self._stop = context.Event()
-        self._executor = ProcessPoolExecutor(count, context, _begin, (self._stop,))
+        self._context = _Remembering()
+        self._stop = self._context.Event()
+        self._executor = ProcessPoolExecutor(count, self._context, _begin, (self._stop,))
 
     def map(self, function: Callable[[A], R], arguments: Sequence[A]) -> list[R]:
         """`function` of each argument, in their order; both must be picklable.
@@ -69,11 +71,46 @@ class Workers:
     def close(self) -> None:
         """End all processes; what they work at is given up."""
         self._stop.set()
+        # A process that does not hear it soon is loading its libraries, or within a long calculation.
+        timer = threading.Timer(_PATIENCE_S, self._context.terminate)
+        timer.start()
         self._executor.shutdown(wait=True, cancel_futures=True)
+        timer.cancel()
+        timer.join()
+
+
+class _DeafProcess(SpawnProcess):
+    """A fresh process that interrupts from the keyboard do not reach, also while it starts."""
+
+    def start(self) -> None:
+        """Start with the signal blocked, which the new process inherits."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Remembering(SpawnContext):
+    """Starts such processes, and remembers them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._started: list[_DeafProcess] = []
+
+    def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # type: ignore[override]
+        """A process that is not yet started."""
+        process = _DeafProcess(*args, **kwargs)
+        self._started.append(process)
+        return process
+
+    def terminate(self) -> None:
+        """End those that run."""
+        for process in self._started:
+            if process.is_alive():
+                process.terminate()
 
 
 def _begin(flag: Any) -> None:
     global _flag
     _flag = flag
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
