@@ -13,7 +13,7 @@ import numpy as np
 
 from gearsim_twin.causes.prior import LogNormal
 from gearsim_twin.fit import fit_tuning, judged
-from gearsim_twin.likelihood import TAU_FACTOR, TAU_MEDIAN_DB, Yardstick
+from gearsim_twin.likelihood import TAU_FACTOR, Yardstick
 from gearsim_twin.model import Model
 from gearsim_twin.stack import ASSUMED
 from gearsim_twin.systematic import smooth_errors
@@ -23,7 +23,18 @@ from gearsim_twin.workbench import Workbench
 __all__ = ["Prior", "calibrated", "plain_prior"]
 
 SMOOTH_DB = 1.0
-"""Spread of smooth errors of a tuned model; single places scatter by `TAU_MEDIAN_DB` beyond."""
+"""Spread of smooth errors of a tuned model; single places scatter beyond."""
+TAU_DB = {
+    "orders": 1.5,
+    "psd": 0.5,
+    "envelope": 0.7,
+    "cyclic": 1.0,
+    "torsional": 1.5,
+    "statistics": 0.4,
+    "transient": 1.0,
+}
+"""That scatter, as measured between a model and itself with other random errors of teeth and numbers a few
+per cent off: single lines of orders depend on which tooth is how wrong, wide bands do not."""
 _FIRST_SHARE = 0.3
 _NO_TAU_DB = 0.02
 # What one healthy machine tells is known no better than this: another day, another load.
@@ -47,7 +58,7 @@ class Prior:
     def tau_of(self, domains: Sequence[str]) -> dict[str, float]:
         """What a good model misses, smooth errors and scatter together, by domain."""
         return {
-            name: float(np.hypot(SMOOTH_DB, self.tau_db.get(name, TAU_MEDIAN_DB)))
+            name: float(np.hypot(SMOOTH_DB, self.tau_db.get(name, TAU_DB[name])))
             for name in domains
             if name != ASSUMED
         }
@@ -64,7 +75,7 @@ class Prior:
         return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread))
 
     def _tau(self, domain: str) -> float:
-        return _NO_TAU_DB if domain == ASSUMED else self.tau_db.get(domain, TAU_MEDIAN_DB)
+        return _NO_TAU_DB if domain == ASSUMED else self.tau_db.get(domain, TAU_DB[domain])
 
 
 def plain_prior(tuning: Tuning) -> Prior:

@@ -80,7 +80,8 @@ def judged(yard: Yardstick, trial: Trial, slopes: Array) -> Fitted:
     """A trial by a yardstick, with the slopes of its coordinates."""
     here = np.array(trial.model.coordinates, dtype=np.float64)
     posterior = yard.posterior(trial.levels, slopes, here)
-    return Fitted(trial, slopes, posterior, yard.value(trial.levels, here) + posterior.volume)
+    value = yard.value(trial.levels, here) - trial.model.reading_nats
+    return Fitted(trial, slopes, posterior, value + posterior.volume)
 
 
 def fit(bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array) -> Fitted:
@@ -139,9 +140,7 @@ def _own_slopes(bench: Workbench, trial: Trial) -> Array:
     """Slopes of the last cause, by one more simulation per parameter."""
     last = trial.model.extensions[-1]
     here = np.array(last.coordinates)
-    steps = [
-        _step(p, float(last.values[p.name]), u) for p, u in zip(last.cause.parameters, here, strict=True)
-    ]
+    steps = [_step(p, float(last.values[p.name]), u) for p, u in zip(last.free, here, strict=True)]
     models = []
     for k, step in enumerate(steps):
         beside = here.copy()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearsim_twin.causes.cause import Parameter, Values
 from gearsim_twin.fit import Fitted
-from gearsim_twin.stack import Array
+from gearsim_twin.model import READ
 from gearsim_twin.verdict import Number
 
 __all__ = ["numbers_of"]
@@ -16,15 +17,30 @@ _Z95 = 1.959964
 def numbers_of(fitted: Fitted, number: int) -> tuple[Number, ...]:
     """Parameters of one of a model's causes with their 95 % intervals.
 
-    The posterior is normal in the coordinates of the priors; an interval is mapped to values end by end.
+    The posterior is normal in the coordinates of the priors; an interval is mapped to values end by end. What
+    was read off the records has the interval of the reading.
     """
-    extension = fitted.trial.model.extensions[number]
-    own = fitted.trial.model.own[number]
-    coordinates: Array = fitted.posterior.coordinates[own]
+    model = fitted.trial.model
+    extension, own = model.extensions[number], model.own[number]
+    coordinates = fitted.posterior.coordinates[own]
     spread = np.sqrt(np.diag(fitted.posterior.covariance)[own])
-    found = []
-    for parameter, u, std in zip(extension.cause.parameters, coordinates, spread, strict=True):
-        low, high = (parameter.prior.value(float(u + side * _Z95 * std)) for side in (-1.0, 1.0))
-        value = parameter.prior.value(float(u))
-        found.append(Number(parameter.name, parameter.unit, value, (low, high)))
-    return tuple(found)
+    fits = {
+        parameter.name: (float(u), float(std))
+        for parameter, u, std in zip(extension.free, coordinates, spread, strict=True)
+    }
+    return tuple(
+        _fitted(parameter, *fits[parameter.name])
+        if parameter.name in fits
+        else _read(parameter, extension.values)
+        for parameter in extension.cause.parameters
+    )
+
+
+def _fitted(parameter: Parameter, coordinate: float, std: float) -> Number:
+    low, middle, high = (parameter.prior.value(coordinate + side * _Z95 * std) for side in (-1.0, 0.0, 1.0))
+    return Number(parameter.name, parameter.unit, middle, (low, high))
+
+
+def _read(parameter: Parameter, values: Values) -> Number:
+    value, std = float(values[parameter.name]), float(values[f"{READ}{parameter.name}"])
+    return Number(parameter.name, parameter.unit, value, (value - _Z95 * std, value + _Z95 * std))

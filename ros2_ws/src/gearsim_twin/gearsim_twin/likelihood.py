@@ -24,7 +24,7 @@ from scipy.special import gammaln
 from gearsim_twin.dependence import independent_share
 from gearsim_twin.stack import Array, Levels, Stack
 
-__all__ = ["TAU_FACTOR", "TAU_MEDIAN_DB", "Noise", "Posterior", "Yardstick"]
+__all__ = ["TAU_FACTOR", "Noise", "Posterior", "Yardstick"]
 
 _NU = 5.0
 _T_CONST = float(gammaln((_NU + 1) / 2) - gammaln(_NU / 2) - 0.5 * np.log(_NU * np.pi))
@@ -33,8 +33,8 @@ WIDE_DB = 20.0
 # What is wholly absent is as wrong as it can be.
 MOST_DB = 40.0
 _OUTLYING = np.array([0.003, 0.01, 0.03, 0.1, 0.3])
-# How levels at single places scatter about a tuned model and its smooth errors: half a dB, within 1.6.
-TAU_MEDIAN_DB, TAU_FACTOR = 0.5, 1.6
+# Within which the scatter of levels at single places about a good model is known beforehand.
+TAU_FACTOR = 1.6
 _TAU_STEPS = np.linspace(-2.5, 3.0, 12)
 _ROUNDS, _NOISE_ROUNDS, _SAME = 10, 4, 1e-2
 

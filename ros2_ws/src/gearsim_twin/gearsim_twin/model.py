@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -10,11 +11,18 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_twin.causes.cause import Cause, Content, Values
+from gearsim_twin.causes.cause import Cause, Content, Parameter, Values
 from gearsim_twin.causes.context import Context
 from gearsim_twin.tuning import Tuning
 
-__all__ = ["Extension", "Model"]
+__all__ = ["READ", "Extension", "Model"]
+
+READ = "std:"
+"""Before the name of a parameter in a start: the standard deviation with which it was read off the records.
+
+Such a parameter is not fitted by simulation."""
+# A reading is chosen among some hundred places that can be told apart.
+_MOST_READING_NATS = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,20 +38,36 @@ class Extension:
         return replace(self, values={**self.values, **numbers})
 
     @property
+    def free(self) -> tuple[Parameter, ...]:
+        """Parameters that are fitted: all but those read off the records."""
+        return tuple(p for p in self.cause.parameters if f"{READ}{p.name}" not in self.values)
+
+    @property
     def coordinates(self) -> tuple[float, ...]:
-        """Its parameters in the coordinates of their priors."""
-        return tuple(p.prior.coordinate(float(self.values[p.name])) for p in self.cause.parameters)
+        """Its free parameters in the coordinates of their priors."""
+        return tuple(p.prior.coordinate(float(self.values[p.name])) for p in self.free)
+
+    @property
+    def reading_nats(self) -> float:
+        """What reading parameters off the records has cost: each had the whole prior to choose from."""
+        cost = 0.0
+        for parameter in self.cause.parameters:
+            if parameter not in self.free:
+                value, std = (float(self.values[key]) for key in (parameter.name, f"{READ}{parameter.name}"))
+                u = parameter.prior.coordinate(value)
+                width = parameter.prior.coordinate(value + std) - parameter.prior.coordinate(value - std)
+                cost += min(0.5 * u * u - math.log(max(0.5 * width, 1e-9)), _MOST_READING_NATS)
+        return max(cost, 0.0)
 
     def at(self, coordinates: tuple[float, ...]) -> Extension:
         """The same at other coordinates."""
-        pairs = zip(self.cause.parameters, coordinates, strict=True)
+        pairs = zip(self.free, coordinates, strict=True)
         return self.with_numbers({p.name: p.prior.value(u) for p, u in pairs})
 
     @property
     def words(self) -> dict[str, str]:
         """What it chose, such as the component."""
-        numbers = {parameter.name for parameter in self.cause.parameters}
-        return {k: str(v) for k, v in self.values.items() if k not in numbers}
+        return {key: value for key, value in self.values.items() if isinstance(value, str)}
 
     @property
     def key(self) -> tuple[str, str]:
@@ -85,8 +109,13 @@ class Model:
         """Where the coordinates of each cause are."""
         ends = [0]
         for extension in self.extensions:
-            ends.append(ends[-1] + len(extension.cause.parameters))
+            ends.append(ends[-1] + len(extension.free))
         return tuple(slice(start, stop) for start, stop in pairwise(ends))
+
+    @property
+    def reading_nats(self) -> float:
+        """What reading parameters off the records has cost, of all causes."""
+        return sum(extension.reading_nats for extension in self.extensions)
 
     def at(self, coordinates: Sequence[float] | NDArray[np.float64]) -> Model:
         """The same at other coordinates."""

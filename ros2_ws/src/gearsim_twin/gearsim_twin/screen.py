@@ -65,7 +65,8 @@ def screen(
     before = yard.value(base.trial.levels, base.at)
     best: dict[tuple[str, str], Screened] = {}
     for trial, (extension, count) in zip(trials, guesses, strict=True):
-        found = Screened(trial, _best_value(yard, base, trial) - before, count)
+        cost = extension.reading_nats
+        found = Screened(trial, _best_value(yard, base, trial) - before - cost, count)
         known = best.get(extension.key)
         if known is None or known.nats < found.nats:
             best[extension.key] = found
@@ -77,7 +78,7 @@ def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
     noise = base.posterior.noise
     candidates = [trial.levels]
     below, above = _power(base.trial.levels.level_db), _power(trial.levels.level_db)
-    if trial.model.extensions[-1].cause.parameters:
+    if trial.model.extensions[-1].free:
         for strength in _STRENGTHS:
             power = np.maximum(below + strength * (above - below), 1e-3 * np.minimum(below, above))
             candidates.append(replace(trial.levels, level_db=10.0 * np.log10(power)))

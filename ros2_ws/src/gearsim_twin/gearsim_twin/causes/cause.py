@@ -69,6 +69,8 @@ class Cause(Protocol):
         """First guesses read off the data, best first, at most four; empty where nothing speaks for it.
 
         A start gives every parameter a number, and beyond them the words of choices, such as `component`.
+        A parameter read off the records better than simulations could tell has its standard deviation under
+        `std:` and its name; it is then not fitted.
         Each start costs a simulation.
         """
 
