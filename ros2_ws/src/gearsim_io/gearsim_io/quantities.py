@@ -7,11 +7,12 @@ scenarios need not (`load_yaml(..., require_source=True)`).
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
@@ -122,13 +123,19 @@ def _registry() -> Any:
 def read_yaml(path: Path) -> Any:
     """The plain content of a YAML 1.2 file (so that 1.5e8 is a number); InputError if it cannot be read."""
     try:
-        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        return copy.deepcopy(_parsed(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         raise InputError(str(path), "", "no such file", "a YAML file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(str(path), "", error, "a readable YAML file") from None
     except YAMLError as error:
         raise InputError(str(path), *syntax_error(error)) from None
+
+
+@lru_cache(maxsize=32)
+def _parsed(text: str) -> Any:
+    """Content of a text; kept, because parsing a machine takes longer than simulating a tenth of a second."""
+    return YAML(typ="safe", pure=True).load(text)
 
 
 def validate(model: type[ModelT], content: Any, where: str, *, require_source: bool = False) -> ModelT:
