@@ -1,14 +1,15 @@
 """Domain envelope: squared envelope spectra of carrier bands, at fault families, turns, and strange lines.
 
 Kinds: line (a harmonic of a family), lines (its first three together, where there are many channels),
-sideband (around the first two), shaft, tone (belongs to nothing), floor (between the lines), ratio (the order
-at which a family is found, in per cent off the nameplate's). Levels are those of the modulation's mean
-square, relative to the squared mean of the envelope: gain and colour do not matter. Families are read where
-they are found on each side, so that a slip changes the ratio alone.
+sideband (around the first two, where nothing else is near), shaft, tone (belongs to nothing), floor (between
+the lines), ratio (the order at which a family is found, in per cent off the nameplate's). Levels are those of
+the modulation's mean square, relative to the squared mean of the envelope: gain and colour do not matter.
+Families are read where they are found on each side, so that a slip changes the ratio alone.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -42,7 +43,7 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
     each = _BUDGET // (len(frame.channels) * len(frame.bands_hz))
     turns = _turns(frame)[: max(1, min(_TURNS, each // 4))]
     left = each - len(turns) - 1
-    fine = sum(_HARMONICS + (f.sideband_order > 0) for f in frame.families) <= left
+    fine = sum(_HARMONICS + bool(_sidebands(frame, f)) for f in frame.families) <= left
     found: list[Place] = []
     for channel in frame.channels:
         for band in frame.bands_hz:
@@ -80,7 +81,7 @@ def _of_family(
         if k * family.order < frame.highest_envelope_order:
             label = f"{k} x {family.label}"
             found.append(Place("envelope", channel, "line", k * family.order, "order", width, label, band))
-    if family.sideband_order > 0:
+    if _sidebands(frame, family):
         found.append(Place("envelope", channel, "sideband", family.order, "order", width, family.label, band))
     return found
 
@@ -209,8 +210,27 @@ def _comb(material: Material, place: Place, expected: dict[tuple[str, str], floa
         return (order * round(place.at / family.order),)
     if place.kind == "lines":
         return tuple(order * k for k in range(1, _HARMONICS + 1))
-    side = family.sideband_order
-    return tuple(order * k + s for k in (1, 2) for s in (-side, side))
+    return tuple(order * k + side for k, side in _sidebands(material.frame, family))
+
+
+def _sidebands(frame: Frame, family: Family) -> list[tuple[int, float]]:
+    """(harmonic, offset) of sidebands that are next to no turn and to no harmonic of another family.
+
+    Of many bearings 2 BSF - FTF is nearly BPFO.
+    """
+    others = [f for f in frame.families if f is not family]
+    found = []
+    for k, side in itertools.product((1, 2), (-family.sideband_order, family.sideband_order)):
+        order = k * family.order + side
+        clear = all(
+            abs(order - n * f.order) > _width(frame, order) + n * f.order * f.tolerance
+            for f in others
+            for n in range(1, _HARMONICS + 2)
+        )
+        near = nearest_turn(frame.machine, order) < 0.6 * _width(frame, order)
+        if family.sideband_order > 0 and clear and not near and order < frame.highest_envelope_order:
+            found.append((k, side))
+    return found
 
 
 def _floor(material: Material, channel: str, band: tuple[float, float]) -> tuple[float, float]:

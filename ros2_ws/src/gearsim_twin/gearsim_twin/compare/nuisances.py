@@ -6,6 +6,7 @@ before anything is concluded from what differs.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,12 +27,13 @@ Vector = NDArray[np.float64]
 _KNOTS = 5
 _TINY = 1e-300
 # What a model that is nearly right still misses at a band and at a line, for the weights of the fit alone.
-_BAND_TAU_DB, _LINE_TAU_DB = 1.5, 3.0
+_BAND_TAU_DB, _LINE_TAU_DB = 1.0, 2.0
 _KNOT_SPREAD_DB, _KNOT_REACH_DB = 6.0, 60.0
 # Where no floor is needed none should be left: a pull too weak to move one that is.
 _KNOT_DEPTH_DB = 40.0
 _FEWEST_PLACES = 4
-_LEAST_CORNER, _USUAL_CORNER, _CORNER_SPREAD = math.log(0.05), math.log(4.0), 1.0
+_LEAST_CORNER, _USUAL_CORNER, _CORNER_SPREAD = math.log(0.05), math.log(4.0), 2.0
+_CORNER_STARTS = (_USUAL_CORNER, math.log(0.5))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,9 @@ class _Fit:
 
     def solve(self) -> ChannelNuisance:
         """The best chain."""
-        best = min((self._from(gain) for gain in self._first_gains()), key=lambda found: found[0])[1]
+        corners = _CORNER_STARTS if self.gain_std_db else _CORNER_STARTS[:1]
+        starts = itertools.product(self._first_gains(), corners)
+        best = min((self._from(gain, corner) for gain, corner in starts), key=lambda found: found[0])[1]
         return self._chain(best)
 
     def _first_gains(self) -> list[float]:
@@ -125,9 +129,9 @@ class _Fit:
         guess = float(np.clip(np.median(ratio), -4 * self.gain_std_db, 4 * self.gain_std_db))
         return [0.0, guess] if abs(guess) > 1.0 else [0.0]
 
-    def _from(self, gain_db: float) -> tuple[float, Vector]:
+    def _from(self, gain_db: float, corner: float) -> tuple[float, Vector]:
         low, start = self._first_floor(gain_db)
-        x = np.concatenate(([gain_db], start, [_USUAL_CORNER]))
+        x = np.concatenate(([gain_db], start, [corner]))
         wide = 60.0 if self.gain_std_db else 1e-6
         lower = np.concatenate(([-wide], low, [_LEAST_CORNER]))
         upper = np.concatenate(([wide], low + 2 * _KNOT_REACH_DB, [math.log(100.0)]))
