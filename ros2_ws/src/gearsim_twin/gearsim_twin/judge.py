@@ -24,6 +24,7 @@ from gearsim_twin.extended import write_extended
 from gearsim_twin.fit import fit_tuning
 from gearsim_twin.measuring_chain import measuring_chain
 from gearsim_twin.model import Model
+from gearsim_twin.realisations import Realisations, realisations_of
 from gearsim_twin.score import score_models
 from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
@@ -81,7 +82,21 @@ class Bench:
             training=tuple(range(training)),
             run=run,
             nuisances=measuring_chain(self.plan, self.case.levels_known),
+            chance=self._chance(numbers, training),
         )
+
+    def _chance(self, numbers: Sequence[int], training: int) -> dict[int, Realisations]:
+        """What chance does to each record: that of the record for training with the most similar speed."""
+        then = partial(features, plan=self.plan)
+        known = {}
+        for k in range(training):
+            job = (numbers[k], self.nominal[numbers[k]])
+            seeds = range(self.settings.seed, self.settings.seed + self.settings.seeds)
+            found = [self.simulator.derived([job], then, self.seconds, seed)[0] for seed in seeds]
+            known[k] = realisations_of(found)
+        speeds = [self.views[number].speed_hz for number in numbers]
+        nearest = [min(known, key=lambda k: abs(speeds[k] - own)) for own in speeds]
+        return {record: known[k] for record, k in enumerate(nearest)}
 
     def context(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
         """What causes may look at."""

@@ -29,6 +29,8 @@ class Settings:
         of two that hide each other neither may be convincing alone.
     trifle_db : float
         Fall of the held-out rms error in the affected domain below which it is not worth a cause.
+    seeds : int
+        Machines of a kind that are simulated to learn what chance does.
     most_seconds : float
         Longest simulation; beyond, it is no longer what limits the comparison.
     seed : int
@@ -44,6 +46,7 @@ class Settings:
     doubt: float = 0.05
     hint_nats: float = -2.5
     trifle_db: float = 0.02
+    seeds: int = 4
     most_seconds: float = 5.0
     seed: int = 1
     workers: int = 1

@@ -17,6 +17,7 @@ from gearsim_twin.stack import Assumed, Levels, Stack, stack_of
 
 if TYPE_CHECKING:
     from gearsim_twin.compare.features import Features
+    from gearsim_twin.realisations import Realisations
 
 __all__ = ["Job", "Nuisances", "Trial", "Workbench"]
 
@@ -76,6 +77,8 @@ class Workbench:
     run : callable
         Jobs to features in their order.
     nuisances : Nuisances
+    chance : mapping of int to Realisations
+        Of some records, what chance does to their levels.
     """
 
     measured: tuple[Features, ...]
@@ -83,6 +86,7 @@ class Workbench:
     training: tuple[int, ...]
     run: Callable[[Sequence[Job]], Sequence[Features]]
     nuisances: Nuisances
+    chance: Mapping[int, Realisations] = field(default_factory=dict)
     simulations: int = 0
     _known: dict[str, Features] = field(default_factory=dict)
     _stack: Stack | None = None
@@ -116,7 +120,8 @@ class Workbench:
         if not missing:
             return
         for key, features in zip(missing, self.run(list(missing.values())), strict=True):
-            self._known[key] = features
+            record = missing[key][0]
+            self._known[key] = self.chance[record].applied(features) if record in self.chance else features
         self.simulations += len(missing)
 
     def _trial(self, model: Model, simulated: Mapping[int, Features], fitted: Sequence[int]) -> Trial:
