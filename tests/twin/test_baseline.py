@@ -91,6 +91,16 @@ def test_without_any_speed_nothing_is_made_up():
         scenario_content(case, lost)
 
 
+def test_what_the_described_drive_cannot_do_is_another_machine():
+    case = case_of("unsw_parallel", "lpm34", parallel_record())
+    view = case.views()[0]
+    fast = dataclasses.replace(view, speed=dataclasses.replace(view.speed, value_hz=31.0, phase=None))
+    with pytest.raises(InputError, match=r"speed: got 31 Hz .*at most 30 Hz.*another machine"):
+        scenario_content(case, fast)
+    with pytest.raises(InputError, match=r"load: got 201 N\*m, expected at most 200 N\*m.*another machine"):
+        scenario_content(case, dataclasses.replace(view, load_nm=201.0))
+
+
 @pytest.mark.records
 @pytest.mark.parametrize(
     ("machine", "name", "force_n"),

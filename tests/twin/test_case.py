@@ -135,6 +135,8 @@ def test_units_and_rates_of_several_records():
     assert case_of("mfpt", "bearing5", one).levels_known
     with pytest.raises(InputError, match=r"noise 1: unit: got 1, expected m/s\^2.*--unit"):
         case_of("mfpt", "bearing5", one, with_(other, unit="1"))
+    with pytest.raises(InputError, match=r"sampling rate: got 500 Hz, expected 1000 to 1e\+06 Hz"):
+        case_of("mfpt", "bearing5", with_(one, sample_rate_hz=500.0))
     with pytest.raises(InputError, match=r"20500 Hz, expected 20000 Hz .*whole multiple"):
         case_of("mfpt", "bearing5", one, with_(other, sample_rate_hz=20500.0))
     twice = case_of("mfpt", "bearing5", one, with_(other, sample_rate_hz=40000.0))

@@ -43,7 +43,7 @@ def scenario_content(case: Case, view: View) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If nothing tells the speed.
+        If nothing tells the speed, or speed or load are beyond the described drive.
 
     Notes
     -----
@@ -54,6 +54,7 @@ def scenario_content(case: Case, view: View) -> dict[str, Any]:
     """
     if not math.isfinite(view.speed_hz):
         raise _no_speed(view)
+    _check_drive(case, view)
     content: dict[str, Any] = {
         "description": f"{case.machine.name} by {case.model} under the conditions of a measured record",
         "machine": machine_word(case.machine_path),
@@ -99,6 +100,21 @@ def _no_speed(view: View) -> InputError:
     )
     found = "none (no angle signal, none on the nameplate, no shaft lines in the vibration)"
     return InputError(view.record.source or "record", "speed", found, expected)
+
+
+def _check_drive(case: Case, view: View) -> None:
+    """A record beyond what the described drive can do is of another machine, or wrongly described."""
+    load_nm = _load_nm(case, view)
+    able = case.modelled
+    where = view.record.source or "record"
+    drive = (
+        f"which the drive of {case.machine.name} can do: else it is another machine, or its drive is stronger"
+    )
+    if view.speed_hz > able.speed_limit_hz:
+        got = f"{view.speed_hz:.4g} Hz ({view.source})"
+        raise InputError(where, "speed", got, f"at most {able.speed_limit_hz:g} Hz, {drive}")
+    if load_nm > able.load_limit_nm:
+        raise InputError(where, "load", f"{load_nm:.4g} N*m", f"at most {able.load_limit_nm:g} N*m, {drive}")
 
 
 def _load_nm(case: Case, view: View) -> float:

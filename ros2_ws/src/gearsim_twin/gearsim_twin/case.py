@@ -29,6 +29,7 @@ LEAST_PERIODS = 4.0
 """Periods of the slowest part that a record must hold: a line of a Hann window is four lines wide."""
 _HELD_OUT_SHARE = 3
 _SAME_RATE = 1e-6
+_RATES_HZ = (1000.0, 1e6)
 _ACCELERATION = "m/s^2"
 
 
@@ -266,6 +267,9 @@ def _name(record: Record) -> str:
 def _one_rate(groups: Groups, remarks: list[str]) -> Groups:
     every = [record for records in groups.values() for record in records]
     slowest = min(every, key=lambda record: record.sample_rate_hz)
+    if not _RATES_HZ[0] <= slowest.sample_rate_hz <= _RATES_HZ[1]:
+        expected = f"{_RATES_HZ[0]:g} to {_RATES_HZ[1]:g} Hz, at which a model can be run"
+        raise InputError(_name(slowest), "sampling rate", f"{slowest.sample_rate_hz:.9g} Hz", expected)
     factors = {}
     for record in every:
         ratio = record.sample_rate_hz / slowest.sample_rate_hz

@@ -30,6 +30,8 @@ class Modelled:
         Shafts whose angle can be measured.
     load_nm, speed_hz : float
         The operating point that the description gives.
+    load_limit_nm, speed_limit_hz : float
+        What its drive can do.
     """
 
     kind: str
@@ -38,6 +40,8 @@ class Modelled:
     tacho_shafts: tuple[str, ...]
     load_nm: float
     speed_hz: float
+    load_limit_nm: float
+    speed_limit_hz: float
 
 
 def describe(machine: str | Path, model: str) -> Modelled:
@@ -73,6 +77,8 @@ def describe(machine: str | Path, model: str) -> Modelled:
         tacho_shafts=tuple(plant.encoders),
         load_nm=float(plant.limits.load_nm),
         speed_hz=float(plant.limits.speed_hz),
+        load_limit_nm=float(plant.limits.load_limit_nm),
+        speed_limit_hz=float(plant.limits.speed_limit_hz),
     )
 
 
