@@ -42,6 +42,7 @@ class Said:
 
     def __init__(self, extended: Path) -> None:
         self.extended = extended
+        self.remarks = ("no held-out record was given ...", "bag: the lines tell another speed")
 
     def words(self) -> str:
         return "The model misses mains_interference."
@@ -99,6 +100,8 @@ def test_json_is_one_object_and_the_folder_holds_both_files(bag, judged, tmp_pat
     assert content["remarks"] == [None]
     assert "note: no held-out record" in printed.err
     assert "twin: simulating" in printed.err
+    assert printed.err.count("note: ") == 2
+    assert "note: bag: the lines tell another speed" in printed.err
     assert {path.name for path in out.iterdir()} == {"twin.json", "extended.yaml"}
     assert json.loads((out / "twin.json").read_text()) == content
     assert (judged["settings"].seed, judged["settings"].workers) == (5, 1)

@@ -107,9 +107,7 @@ def _check_drive(case: Case, view: View) -> None:
     load_nm = _load_nm(case, view)
     able = case.modelled
     where = view.record.source or "record"
-    drive = (
-        f"which the drive of {case.machine.name} can do: else it is another machine, or its drive is stronger"
-    )
+    drive = f"as the drive of {case.machine.name} can do; it is another machine, or has a stronger drive"
     if view.speed_hz > able.speed_limit_hz:
         got = f"{view.speed_hz:.4g} Hz ({view.source})"
         raise InputError(where, "speed", got, f"at most {able.speed_limit_hz:g} Hz, {drive}")

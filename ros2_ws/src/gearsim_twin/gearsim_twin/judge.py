@@ -176,7 +176,8 @@ def _judged(
         {name: [trial.features[k] for k in work.holdout] for name, trial in zip(names, trials, strict=True)},
         settings.seed,
     )
-    evidence = Evidence(work, selection, prior, scores, case.remarks)
+    remarks = dict.fromkeys([*case.remarks, *(each for view in bench.views for each in view.remarks)])
+    evidence = Evidence(work, selection, prior, scores, tuple(remarks))
     verdict = concluded(evidence)
     if out is None:
         return verdict

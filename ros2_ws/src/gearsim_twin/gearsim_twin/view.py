@@ -79,6 +79,13 @@ class View:
         return self.speed.source
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is doubtful, a sentence each for people."""
+        name = self.record.source or "record"
+        places = [f"{name}, {one.channel}" if one.channel else name for one in self.issues]
+        return tuple(f"{place}: {one.detail}" for place, one in zip(places, self.issues, strict=True))
+
+    @property
     def turns(self) -> float:
         """Turns of the reference shaft in the record; NaN where the speed is not known."""
         if self.phase is not None:

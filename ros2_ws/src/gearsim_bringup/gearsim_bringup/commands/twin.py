@@ -84,6 +84,8 @@ def command(
     for remark in case.remarks:
         voice.say(f"note: {remark}")
     verdict = run_judge(case, folder, workers, seed)
+    for remark in verdict.remarks[len(case.remarks) :]:
+        voice.say(f"note: {remark}")
     voice.result(verdict.to_json())
     for line in lines(verdict):
         voice.say(line)
