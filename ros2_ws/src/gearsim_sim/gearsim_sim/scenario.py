@@ -149,7 +149,8 @@ class ScenarioModel(Strict):
     structure: StructureModel = StructureModel()
     sensors: SensorsModel = SensorsModel()
     parameters: dict[str, Any] = Field(default_factory=dict)
-    """Dotted names of the machine's `model` section with other values."""
+    """Dotted names of the machine's `model` section with other values; also dimensions of bearings that are
+    not as the nameplate says, such as `nameplate.bearings.bearing_3.element_diameter`."""
     faults: tuple[FaultModel, ...] = ()
     timeline: tuple[EventModel, ...] = ()
 

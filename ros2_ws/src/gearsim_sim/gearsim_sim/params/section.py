@@ -10,12 +10,16 @@ from typing import Any
 from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Machine
+from gearsim_sim.params.as_built import PREFIX, as_built
 from gearsim_sim.params.overrides import override
 
 
 @dataclass(frozen=True)
 class ModelSection:
-    """What a machine description holds for the simulator; `where` names it in errors."""
+    """What a machine description holds for the simulator; `where` names it in errors.
+
+    `plate` is the nameplate with the bearings as they are built.
+    """
 
     plate: Machine
     where: str
@@ -36,7 +40,8 @@ def read_model_section(
     example : str
         A shipped machine of that kind, for errors.
     overrides : mapping or None
-        Dotted names of the section and the numbers that replace it (see `override`).
+        Dotted names of the section and the numbers that replace it (see `override`); names that begin with
+        `nameplate.` tell how bearings are built where the nameplate is wrong (see `as_built`).
     source : str
         Where the overrides come from, for errors.
 
@@ -53,6 +58,9 @@ def read_model_section(
         found = section.get("kind") if isinstance(section, dict) else section
         raise InputError(where, "kind", found, f"{kind}, as machine {example} has it")
     if overrides:
-        section = override(section, overrides, source or where)
+        built = {name: value for name, value in overrides.items() if name.startswith(PREFIX)}
+        plate = as_built(plate, built, source or where)
+        rest = {name: value for name, value in overrides.items() if name not in built}
+        section = override(section, rest, source or where)
         where = f"{source or where} (parameters, with {path})"
     return ModelSection(plate, where, section)
