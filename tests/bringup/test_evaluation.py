@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from gearsim_bringup.commands.evaluate import command
-from gearsim_bringup.evaluation import run
+from gearsim_bringup.evaluation import rejudge, run
 from gearsim_bringup.evaluation.cases import SETS, draw_case
 from gearsim_bringup.evaluation.page import evaluation_page, summary
 from gearsim_bringup.evaluation.rejudge import rejudged
@@ -170,6 +170,15 @@ def test_results_are_rejudged_with_the_present_weights():
     assert old["findings"][0]["confidence"] == 0.1
     assert new["findings"][0]["confidence"] != 0.1
     assert new["findings"][0]["fault"] in ("gear_tooth_crack", "gear_tooth_spall")
+
+
+def test_what_was_doubtful_is_weighed_anew_too(monkeypatch):
+    old = result([])
+    old["doubtful"] = [finding("gears", "gear_wear", 0.1, features={})]
+    monkeypatch.setattr(rejudge, "confidence", lambda fault, features: 0.8)
+    assert [one["fault"] for one in rejudged(old)["findings"]] == ["gear_wear"]
+    monkeypatch.setattr(rejudge, "confidence", lambda fault, features: 0.2)
+    assert rejudged(old)["findings"] == []
 
 
 def test_a_refused_machine_counts_for_nothing():

@@ -74,7 +74,10 @@ class DiagnosisSettings:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What is known of a machine after one record; `angle` is that of its reference shaft over the record."""
+    """What is known of a machine after one record; `angle` is that of its reference shaft over the record.
+
+    `doubtful` are those below `LEAST_CONFIDENCE`, which are no findings.
+    """
 
     speed: ShaftSpeed
     quality: tuple[QualityIssue, ...]
@@ -85,6 +88,7 @@ class Diagnosis:
     judged_parts: tuple[str, ...] = ()
     angle: RecordSpeed = field(default=RecordSpeed(None), repr=False, compare=False)
     lacking: str = ""
+    doubtful: tuple[Finding, ...] = ()
 
     @property
     def judged(self) -> bool:
@@ -183,7 +187,8 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     measured = Measured.of_record(sound, plate, speed)
     said = all_findings(measured, verdict.findings)
     findings = tuple(with_size(one, measured) for one in said if one.confidence >= LEAST_CONFIDENCE)
-    notes += [_doubtful(one) for one in said if one.confidence < LEAST_CONFIDENCE]
+    doubtful = tuple(one for one in said if one.confidence < LEAST_CONFIDENCE)
+    notes += [_doubtful(one) for one in doubtful]
     electrical = _electrical_notes(record, plate, verdict, findings)
     if not findings:
         supply = plate.line_frequency_hz or 50.0
@@ -201,6 +206,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         _judged_parts(measured, verdict),
         angle,
         what_is_lacking(plate, measured),
+        doubtful,
     )
 
 

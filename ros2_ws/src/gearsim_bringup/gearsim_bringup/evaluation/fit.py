@@ -120,7 +120,7 @@ def _confidence(results: Sequence[Result], file: Path, source: str) -> str:
     findings = [
         (f["fault"], f["evidence"].get("features", {}), is_right(f, one))
         for one in results
-        for f in one["findings"]
+        for f in (*one["findings"], *one.get("doubtful", ()))
     ]
     models: dict[str, dict[str, float]] = {}
     right = sum(ok for _, _, ok in findings)

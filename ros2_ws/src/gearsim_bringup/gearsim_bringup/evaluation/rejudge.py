@@ -25,7 +25,8 @@ def rejudged(result: Result) -> Result:
     if "refused" in result:
         return result
     fresh = copy.deepcopy(result)
-    for finding in fresh["findings"]:
+    said = [*fresh["findings"], *fresh.pop("doubtful", ())]
+    for finding in said:
         evidence = finding["evidence"]
         features = evidence.get("features", {})
         if "kind_features" in evidence:
@@ -35,8 +36,6 @@ def rejudged(result: Result) -> Result:
         if "side_variances" in evidence:
             evidence.update(side_words(evidence["side_features"], evidence["side_variances"]))
         finding["confidence"] = confidence(finding["fault"], features)
-    sure = [
-        one for one in fresh["findings"] if one["confidence"] >= LEAST_CONFIDENCE or one["fault"] == "crashed"
-    ]
+    sure = [one for one in said if one["confidence"] >= LEAST_CONFIDENCE or one["fault"] == "crashed"]
     fresh["findings"] = sorted(sure, key=lambda one: -one["confidence"])
     return fresh

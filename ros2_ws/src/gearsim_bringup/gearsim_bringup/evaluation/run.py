@@ -87,6 +87,7 @@ def _result(case: Case, diagnosis: Diagnosis, cpu_s: float) -> Result:
         "speed_hz": told["speed_hz"],
         "quality": told["quality"],
         "findings": told["findings"],
+        "doubtful": [one.to_json() for one in diagnosis.doubtful],  # else a fit would see the sure ones only
         "cpu_s": round(cpu_s, 3),
     }
 
