@@ -185,13 +185,18 @@ class _Mixture:
         else:
             hz = levels.frequency_hz[inside]
             width = np.array([places[k].width for k in inside])
-            density = 10 ** (0.1 * levels.level_db[inside])
-            # Lines are spread like the noise around them; below the lowest band they are passed as they are.
-            density = density * (10 ** (0.1 * level) / max(float(np.sum(density * width)), _TINY))
+            power = 10 ** (0.1 * levels.level_db[inside]) * width
+            for k in np.flatnonzero(rows & simulated.stands_out & np.isfinite(levels.frequency_hz)).tolist():
+                if places[k].domain == "orders":
+                    near = np.argmin(np.abs(np.log(hz / levels.frequency_hz[k])))
+                    if abs(hz[near] - levels.frequency_hz[k]) <= 0.6 * width[near]:
+                        power[near] += 10 ** (0.1 * levels.level_db[k])
+            # Lines that no place has are spread like the rest.
+            density = power / width * (10 ** (0.1 * level) / max(float(power.sum()), _TINY))
         model, noise = chain.gain(hz) * density, chain.floor(hz)
         both = np.maximum(model + noise, _TINY)
         total, extent = float(np.sum(both * width)), float(np.sum(width))
-        crossed = extent * float(np.sum((both**2 - model**2) * width)) / total**2
+        crossed = extent * float(np.sum((both**2 - model**2) * width)) / max(total**2, _TINY)
         coherent = float(np.sum((model / both) ** 2 * width)) / extent
         return cls(float(np.sum(model * width)), float(np.sum(noise * width)), crossed, coherent)
 
