@@ -175,9 +175,9 @@ def test_results_are_rejudged_with_the_present_weights():
 def test_what_was_doubtful_is_weighed_anew_too(monkeypatch):
     old = result([])
     old["doubtful"] = [finding("gears", "gear_wear", 0.1, features={})]
-    monkeypatch.setattr(rejudge, "confidence", lambda fault, features: 0.8)
+    monkeypatch.setattr(rejudge, "confidence", lambda _fault, _features: 0.8)
     assert [one["fault"] for one in rejudged(old)["findings"]] == ["gear_wear"]
-    monkeypatch.setattr(rejudge, "confidence", lambda fault, features: 0.2)
+    monkeypatch.setattr(rejudge, "confidence", lambda _fault, _features: 0.2)
     assert rejudged(old)["findings"] == []
 
 
