@@ -40,6 +40,25 @@ def test_conditions_and_sensors_are_those_of_the_record():
     assert [row.channel for row in scenario.sensors.torques] == ["input_torque"]
 
 
+def test_of_tachos_with_other_pulses_that_of_the_reference_shaft_counts():
+    record = parallel_record()
+    one, other = record.tachos
+    fine = np.linspace(0.0, record.sample_count - 1.0, 1800)
+    dense = dataclasses.replace(other, pulses_per_revolution=60.0, samples=fine)
+    odd = dataclasses.replace(one, pulses_per_revolution=0.5, samples=one.samples[::2])
+    case = case_of("unsw_parallel", "lpm34", dataclasses.replace(record, tachos=(dense, one)))
+    tachos = scenario_content(case, case.views()[0])["sensors"]["tachos"]
+    assert tachos == {"shafts": ["input"], "pulses": 1}
+    case = case_of("unsw_parallel", "lpm34", dataclasses.replace(record, tachos=(odd,)))
+    view = case.views()[0]
+    content = scenario_content(case, view)
+    assert content["sensors"]["tachos"] == {"shafts": []}  # no scenario can have half a pulse
+    with Simulator(case, measured=[view]) as simulator:
+        (made,) = simulator.views({0: content}, 1.0)
+    assert made.speed_hz == view.speed_hz == pytest.approx(9.9, rel=1e-5)
+    assert made.phase is not None
+
+
 def test_a_file_of_the_content_is_a_scenario(tmp_path: Path):
     case = case_of("unsw_parallel", "lpm34", parallel_record())
     content = scenario_content(case, case.views()[0])

@@ -97,6 +97,9 @@ def test_one_recording_in_two_places_is_refused():
     with pytest.raises(InputError, match=r"MEASURED.*once more, expected every recording once"):
         case_of("unsw_parallel", "lpm34", record, scaled)
     assert not same_recording(record, parallel_record(1.5, seed=2))
+    # The same run with other noise, 60 dB down, is another recording.
+    noise = np.random.default_rng(0).standard_normal(record.data.shape) * 1e-3 * record.data.std()
+    assert not same_recording(record, with_(record, data=(record.data + noise).astype(np.float32)))
 
 
 def test_models_that_do_not_describe_the_machine():
