@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from ruamel.yaml import YAML
 
 from gearsim_twin.causes.cause import Content
@@ -34,10 +35,19 @@ def write_extended(path: Path, content: Content, comments: Sequence[str]) -> Pat
     yaml.width = _WIDTH
     yaml.sort_base_mapping_type_on_output = False
     text = io.StringIO()
-    yaml.dump(content, text)
+    yaml.dump(_plain(content), text)
     head = "".join(
         textwrap.fill(" ".join(each.split()), _WIDTH, initial_indent="# ", subsequent_indent="#   ") + "\n"
         for each in comments
     )
     path.write_text(head + text.getvalue(), encoding="utf-8")
     return path
+
+
+def _plain(value: Any) -> Any:
+    """Without types of arrays, which no YAML file knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(each) for each in value]
+    return value.item() if isinstance(value, np.generic) else value

@@ -137,16 +137,26 @@ def _with_own(bench: Workbench, trial: Trial, known_slopes: Array) -> Array:
 
 
 def _own_slopes(bench: Workbench, trial: Trial) -> Array:
-    """Slopes of the last cause, by one more simulation per parameter."""
+    """Slopes of the last cause, by one more simulation per parameter; backwards where it refuses that."""
     last = trial.model.extensions[-1]
     here = np.array(last.coordinates)
-    steps = [_step(p, float(last.values[p.name]), u) for p, u in zip(last.free, here, strict=True)]
-    models = []
-    for k, step in enumerate(steps):
-        beside = here.copy()
-        beside[k] += step
-        models.append(trial.model.with_last(last.at(tuple(beside))))
-    return _slopes(trial, bench.trials(models), np.array(steps))
+    pairs = zip(last.free, here, strict=True)
+    steps = np.array([_step(p, float(last.values[p.name]), u) for p, u in pairs])
+    beside = bench.trials([_beside(trial.model, here, k, step) for k, step in enumerate(steps)])
+    refused = [k for k, each in enumerate(beside) if each.refused]
+    if refused:
+        steps[refused] *= -1.0
+        again = bench.trials([_beside(trial.model, here, k, float(steps[k])) for k in refused])
+        for k, each in zip(refused, again, strict=True):
+            beside[k] = trial if each.refused else each
+    return _slopes(trial, beside, steps)
+
+
+def _beside(model: Model, here: Array, number: int, step: float) -> Model:
+    """The model with one coordinate of its last cause changed."""
+    moved = here.copy()
+    moved[number] += step
+    return model.with_last(model.extensions[-1].at(tuple(moved)))
 
 
 def _step(parameter: Parameter, value: float, coordinate: float) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from gearsim_io.errors import InputError
 from gearsim_twin.baseline import scenario_content
 from gearsim_twin.calibrate import Prior, calibrated, plain_prior
 from gearsim_twin.case import LEAST_PERIODS, Case, least_seconds
@@ -71,10 +72,8 @@ class Bench:
         """Some records of the case, the first so many of them for training."""
         numbers = tuple(records)
 
-        def run(jobs: Sequence[Job]) -> Sequence[Features]:
-            own = [(numbers[k], content) for k, content in jobs]
-            then = partial(features, plan=self.plan)
-            return self.simulator.derived(own, then, self.seconds, self.settings.seed)
+        def run(jobs: Sequence[Job]) -> Sequence[Features | None]:
+            return self._made([(numbers[k], content) for k, content in jobs])
 
         return Workbench(
             measured=tuple(features(self.views[k], self.plan) for k in numbers),
@@ -84,6 +83,14 @@ class Bench:
             nuisances=measuring_chain(self.plan, self.case.levels_known),
             chance=self._chance(numbers, training),
         )
+
+    def _made(self, jobs: Sequence[Job]) -> Sequence[Features | None]:
+        """Features of simulations; None for those that the simulator refuses."""
+        then = partial(features, plan=self.plan)
+        try:
+            return self.simulator.derived(jobs, then, self.seconds, self.settings.seed)
+        except InputError:
+            return [None] if len(jobs) == 1 else [one for job in jobs for one in self._made([job])]
 
     def _chance(self, numbers: Sequence[int], training: int) -> dict[int, Realisations]:
         """What chance does to each record: that of the record for training with the most similar speed."""

@@ -6,6 +6,7 @@ guess added. So one simulation tells how well the cause would do at any strength
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from gearsim_twin.model import Extension
 from gearsim_twin.stack import Array
 from gearsim_twin.workbench import Trial, Workbench
 
-__all__ = ["Screened", "first_guesses", "screen"]
+__all__ = ["Screened", "first_guesses", "most_hopeful", "screen"]
 
 _STRENGTHS = 2.0 ** np.arange(-5, 6)
 
@@ -55,6 +56,23 @@ def first_guesses(causes: tuple[Cause, ...], context: Context) -> list[tuple[Ext
         guesses = cause.starts(context)
         found += [(Extension(cause, guess, context), len(guesses)) for guess in guesses]
     return found
+
+
+def most_hopeful(
+    guesses: list[tuple[Extension, int]], earlier: Mapping[tuple[str, str], float], most: int
+) -> list[tuple[Extension, int]]:
+    """So many of the guesses: new ones first, then those that did best in the round before.
+
+    Of equal ones each cause's first guess comes before any second one.
+    """
+    rank: dict[str, int] = {}
+    order = []
+    for extension, _ in guesses:
+        place = rank.setdefault(extension.cause.name, 0)
+        rank[extension.cause.name] += 1
+        order.append((-earlier.get(extension.key, np.inf), place))
+    kept = sorted(range(len(guesses)), key=lambda k: order[k])[:most]
+    return [guesses[k] for k in sorted(kept)]
 
 
 def screen(

@@ -18,7 +18,7 @@ from gearsim_twin.choices import Candidate, Choice, Round
 from gearsim_twin.fit import Fitted, fit, judged
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.needed import gain_between, needed, settled
-from gearsim_twin.screen import Screened, first_guesses, screen
+from gearsim_twin.screen import Screened, first_guesses, most_hopeful, screen
 from gearsim_twin.settings import Settings
 from gearsim_twin.workbench import Trial, Workbench
 
@@ -92,7 +92,7 @@ def select(
     certain = (yard, tuned, choices)
     tentative = False
     while len(choices) < settings.most_causes:
-        done, yard, current = _round(search, yard, current, {choice.key for choice in choices}, len(rounds))
+        done, yard, current = _round(search, yard, current, {choice.key for choice in choices}, rounds)
         rounds.append(done)
         if done.taken is not None:
             number = done.taken
@@ -112,7 +112,7 @@ def select(
 
 
 def _round(
-    search: _Search, yard: Yardstick, current: Fitted, taken: set[tuple[str, str]], number: int
+    search: _Search, yard: Yardstick, current: Fitted, taken: set[tuple[str, str]], rounds: list[Round]
 ) -> tuple[Round, Yardstick, Fitted]:
     context = search.context_of(current.trial)
     guesses = [
@@ -120,6 +120,9 @@ def _round(
         for extension, count in first_guesses(search.causes, context)
         if extension.key not in taken
     ]
+    names = len({extension.cause.name for extension, _ in guesses})
+    earlier = {each.extension.key: each.nats for each in rounds[-1].left} if rounds else {}
+    guesses = most_hopeful(guesses, earlier, search.settings.most_guesses // (2 if rounds else 1))
     search.tell(f"trying {len(guesses)} first guesses")
     screened = screen(search.bench, yard, current, guesses)
     chosen = _worth_fitting(screened, search.settings)
@@ -128,9 +131,8 @@ def _round(
         search.tell(f"fitting {each.extension.cause.name}")
         fits.append((fit(search.bench, yard, each.trial, current.slopes), each.guesses))
     yard, current, fits = _same_measure(yard, current, fits)
-    names = len({extension.cause.name for extension, _ in guesses})
     candidates = _probable(search.settings, current, fits, names)
-    candidates, accepted = _held_out(search, yard, current, candidates, number)
+    candidates, accepted = _held_out(search, yard, current, candidates, len(rounds))
     left = tuple(each for each in screened if each not in chosen)
     return Round(tuple(candidates), left, accepted), yard, current
 

@@ -18,6 +18,8 @@ class Settings:
         Causes that one model may get.
     fits : int
         Causes that are fitted in a round, those that the best one may be confused with not counted.
+    most_guesses : int
+        First guesses that are simulated in the first round; half as many in later ones.
     worth_fitting_nats : float
         Better log likelihood at the first guess, below which no fit is tried.
     another : float
@@ -41,6 +43,7 @@ class Settings:
 
     most_causes: int = 3
     fits: int = 4
+    most_guesses: int = 40
     worth_fitting_nats: float = 1.0
     another: float = 0.3
     doubt: float = 0.05

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from gearsim_twin.causes.cause import Content
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from gearsim_twin.realisations import Realisations
 
 __all__ = ["Job", "Nuisances", "Trial", "Workbench"]
+
+_REFUSED_DB = 100.0
 
 Job = tuple[int, Content]
 """Number of the record whose conditions they are, and what the scenario holds."""
@@ -54,12 +56,15 @@ class Trial:
     features : mapping of int to Features
         The same by record.
     nuisance : object
+    refused : bool
+        The simulator refused it: such a machine cannot be. Its levels are as wrong as can be.
     """
 
     model: Model
     levels: Levels
     features: Mapping[int, Features]
     nuisance: Any
+    refused: bool = False
 
 
 @dataclass(eq=False)
@@ -75,7 +80,7 @@ class Workbench:
     training : tuple of int
         Records that may be fitted to.
     run : callable
-        Jobs to features in their order.
+        Jobs to features in their order; None for what the simulator refuses.
     nuisances : Nuisances
     chance : mapping of int to Realisations
         Of some records, what chance does to their levels.
@@ -84,11 +89,11 @@ class Workbench:
     measured: tuple[Features, ...]
     nominal: tuple[Content, ...]
     training: tuple[int, ...]
-    run: Callable[[Sequence[Job]], Sequence[Features]]
+    run: Callable[[Sequence[Job]], Sequence[Features | None]]
     nuisances: Nuisances
     chance: Mapping[int, Realisations] = field(default_factory=dict)
     simulations: int = 0
-    _known: dict[str, Features] = field(default_factory=dict)
+    _known: dict[str, Features | None] = field(default_factory=dict)
     _stack: Stack | None = None
 
     @property
@@ -121,10 +126,16 @@ class Workbench:
             return
         for key, features in zip(missing, self.run(list(missing.values())), strict=True):
             record = missing[key][0]
-            self._known[key] = self.chance[record].applied(features) if record in self.chance else features
+            if features is not None and record in self.chance:
+                features = self.chance[record].applied(features)
+            self._known[key] = features
         self.simulations += len(missing)
 
-    def _trial(self, model: Model, simulated: Mapping[int, Features], fitted: Sequence[int]) -> Trial:
+    def _trial(self, model: Model, made: Mapping[int, Features | None], fitted: Sequence[int]) -> Trial:
+        simulated = {k: each for k, each in made.items() if each is not None}
+        if len(simulated) < len(made):
+            level = self.stack.measured.level_db + _REFUSED_DB
+            return Trial(model, replace(self.stack.measured, level_db=level), {}, None, refused=True)
         nuisance = self.nuisances.fit([(self.measured[k], simulated[k]) for k in fitted])
         shown = {k: self.nuisances.apply(nuisance, each) for k, each in simulated.items()}
         levels = self.stack.filled(shown, self.nuisances.corrections_db(nuisance))
