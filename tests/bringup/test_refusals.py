@@ -58,6 +58,13 @@ def files(tmp_path):
         ),
         ("ensemble {0}/key.yaml --seconds 1 --out {0}/taken", "taken: got a folder that exists already"),
         ("diagnose {0}/nothing", "got nothing there"),
+        ("twin {0}/nothing --machine mfpt --model bearing5", "got nothing there"),
+        ("twin {0}/taken --machine mfpt --model bearin5", "did you mean bearing5?"),
+        ("twin {0}/taken --machine gear0 --model lpm34", "nothing can be simulated (docs/rigs.md"),
+        (
+            "twin {0}/taken --machine mfpt --model bearing5 --holdout {0}/taken",
+            "of MEASURED once more, expected a recording that nothing is fitted to",
+        ),
     ],
 )
 def test_bad_input_is_refused_before_the_slow_imports(files, command, words):
