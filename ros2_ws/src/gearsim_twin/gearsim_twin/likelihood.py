@@ -121,7 +121,8 @@ class Yardstick:
     def loglike(self, residual_db: Array, variance_db2: Array, noise: Noise) -> Array:
         """Log likelihood of each place, times its share, shape (n,); 0 where a place does not count."""
         told = np.isfinite(residual_db)
-        s2 = variance_db2 + noise.tau_db[self.stack.domain] ** 2
+        # Where one side has nothing its variance may be infinite, too.
+        s2 = np.where(told, variance_db2, 1.0) + noise.tau_db[self.stack.domain] ** 2
         core, wide = densities(np.where(told, residual_db, 0.0), s2)
         outlying = noise.outlying[self.stack.domain]
         terms = np.log(core + outlying * (wide - core)) * self.share[self.stack.domain]
