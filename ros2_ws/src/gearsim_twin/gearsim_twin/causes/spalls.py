@@ -1,0 +1,145 @@
+"""What the spalls of bearings share: where they are, how wide as a first guess, and what fits in."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from gearsim_twin.causes.bearing_model import bearings_of, fault_of, seat_of
+from gearsim_twin.causes.bearing_signs import Sign, size_of, unexplained_signs
+from gearsim_twin.causes.cause import Content, Parameter, Values
+from gearsim_twin.causes.edit import with_fault
+from gearsim_twin.causes.prior import LogNormal
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+__all__ = [
+    "SPALL_WIDTH",
+    "RaceSpall",
+    "candidates",
+    "has_bearings",
+    "known_width_m",
+    "sign_words",
+    "width_starts",
+]
+
+SPALL_WIDTH = Parameter("width_m", "m", LogNormal(0.8e-3, 2.0, 5e-5, 1e-2))
+"""Width along the race or element: pits that are told in the literature have 0.2 to 3 mm."""
+
+# First guesses where the width cannot be told, in parts of the element's diameter: a level goes up with the
+# width until the element reaches the bottom, then shape and spacing of the events change.
+_GUESSES = (0.05, 0.12, 0.27)
+_MOST_STARTS = 4
+_ROOM = 0.98
+_NEARLY = 0.5
+_FAR_LOG = 0.5  # a width by events that is further from the usual one has that as a second guess
+
+
+def has_bearings(context: Context) -> bool:
+    """Whether the model has bearings that are on the nameplate."""
+    named = {bearing.name for bearing in context.case.machine.bearings}
+    return bool(named & set(bearings_of(context.contents[0])))
+
+
+def candidates(context: Context, fault: str, kind: str) -> list[tuple[int, Sign]]:
+    """Unexplained signs of bearings that the model has, and without that kind of fault as yet."""
+    content = context.contents[0]
+    known = bearings_of(content)
+    return [
+        (record, sign)
+        for record, sign in unexplained_signs(context, fault)
+        if sign.component in known and fault_of(content, kind, sign.component) is None
+    ]
+
+
+def known_width_m(context: Context, record: int, sign: Sign) -> float | None:
+    """Width of a spall by the events of its crossings, if they tell it."""
+    sizing = size_of(context.views[record], sign)
+    return None if sizing is None or sizing.width is None else sizing.width.value_m
+
+
+def sign_words(sign: Sign, context: Context, record: int) -> dict[str, float | str]:
+    """What the plain words of a signature need."""
+    return {
+        "component": sign.component,
+        "line_order": float(f"{sign.expected_order:.6g}"),
+        "line_hz": float(f"{sign.expected_order * context.views[record].speed_hz:.4g}"),
+    }
+
+
+def width_starts(
+    context: Context, signs: list[tuple[int, Sign]], known_m: float | None = None
+) -> list[dict[str, float | str]]:
+    """Widths for the likeliest bearing, fewer where another one with the same lines is nearly as likely."""
+    near = [each for each in signs if each[1].weight > _NEARLY * signs[0][1].weight]
+    found: list[dict[str, float | str]] = []
+    for number, (record, sign) in enumerate(signs):
+        diameter = context.case.machine.bearing(sign.component).element_diameter_m
+        widths = [part * diameter for part in _GUESSES]
+        if len(near) > 1:
+            widths = widths[1:]
+        if number >= len(near):
+            widths = [_GUESSES[1] * diameter]
+        if known_m is not None:
+            far = abs(math.log(known_m / (_GUESSES[1] * diameter))) > _FAR_LOG
+            widths = [known_m, _GUESSES[1] * diameter] if far and number == 0 else [known_m]
+        words = sign_words(sign, context, record)
+        found += [{**words, "width_m": width} for width in widths]
+    return found[:_MOST_STARTS]
+
+
+class RaceSpall:
+    """A localised spall of one race of a bearing.
+
+    Parameters
+    ----------
+    name : str
+        Published name of the cause.
+    fault : str
+        What the diagnosis calls it.
+    kind : str
+        Kind of fault of the simulator.
+    confused_with : tuple of (str, str)
+    """
+
+    parameters: tuple[Parameter, ...] = (SPALL_WIDTH,)
+
+    def __init__(self, name: str, fault: str, kind: str, confused_with: tuple[tuple[str, str], ...]) -> None:
+        self.name = name
+        self.fault = fault
+        self.kind = kind
+        self.confused_with = confused_with
+
+    def applies(self, context: Context) -> bool:
+        """Wherever a bearing is modelled."""
+        return has_bearings(context)
+
+    def starts(self, context: Context) -> list[dict[str, float | str]]:
+        """The bearing whose lines stand out most, as wide as its events tell; then those alike in lines."""
+        signs = candidates(context, self.fault, self.kind)
+        if not signs:
+            return []
+        record, sign = signs[0]
+        known = known_width_m(context, record, sign)
+        return width_starts(context, signs, known)
+
+    def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
+        """The content with the spall, in the load zone of a ring that stands."""
+        component = str(values["component"])
+        law = seat_of(content, component).law
+        inner = self.fault == "inner_race"
+        radius = law.inner_race_radius_m if inner else law.outer_race_radius_m
+        widest = _ROOM * min(law.ball_spacing_rad * radius, 2 * law.ball_radius_m)
+        width = min(float(values["width_m"]), widest)
+        return with_fault(content, self.kind, component, {"width_m": width})
+
+    def signature(self, values: Values) -> str:
+        """In plain words."""
+        race = self.fault.replace("_race", "")
+        sides = " with sidebands at the turns of the shaft" if self.fault == "inner_race" else ""
+        return (
+            f"impacts at {float(values['line_hz']):.4g} Hz and multiples (order "
+            f"{float(values['line_order']):.4g}){sides} in the envelope: a spall of the {race} race of "
+            f"{values['component']}, about {1e3 * float(values['width_m']):.2g} mm wide"
+        )
