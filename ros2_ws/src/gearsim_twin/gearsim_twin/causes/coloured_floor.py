@@ -1,0 +1,101 @@
+"""Noise of the measuring chain: a floor, rising towards low frequencies, that the machine does not make."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_twin.causes.cause import Content, Parameter, Values
+from gearsim_twin.causes.edit import with_sensor
+from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, fit_curve
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+__all__ = ["ColouredFloor"]
+
+Array = NDArray[np.float64]
+
+_LEAST_DROP = 30.0
+_LEAST_SHARE = 0.2
+_LEAST_BANDS = 6  # half an octave in which the floor lies above the model
+_OVER_DB = 3.0
+
+
+def floor_db(frequency_hz: Array, density: float, corner_hz: float) -> Array:
+    """Power density in dB of white noise that rises as 1/f below a corner."""
+    return np.asarray(20 * np.log10(density) + 10 * np.log10(1 + corner_hz / frequency_hz))
+
+
+def _floor(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG001
+    """Density and corner, if adding such a floor to the model mends it over half an octave at least."""
+    f = data.frequency_hz
+
+    def predicted(p: Array) -> Array:
+        added = floor_db(f, 10 ** (p[0] / 20), 10 ** p[1])
+        return np.asarray(10 * np.log10(10 ** (data.simulated_db / 10) + 10 ** (added / 10)))
+
+    quiet = float(np.quantile(data.measured_db, 0.1))
+    starts = [(quiet + up, corner) for up in (-6.0, 0.0) for corner in (0.0, 2.0, 3.5)]
+    fit = fit_curve(data, predicted, starts, ((-300.0, -2.0), (200.0, 5.0)), gain=False)
+    added = floor_db(f, 10 ** (fit.values[0] / 20), 10 ** fit.values[1])
+    lifted = int(np.count_nonzero(added > data.simulated_db + _OVER_DB))
+    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or lifted < _LEAST_BANDS:
+        return None
+    density, corner = 10 ** (fit.values[0] / 20), 10 ** fit.values[1]
+    values = np.array([density, corner])
+    std = np.array([0.1151 * fit.std[0] * density, 2.3026 * min(fit.std[1], 3.0) * corner])
+    return CurveFit(values, std, fit.gain_db, fit.drop, fit.share)
+
+
+class ColouredFloor:
+    """White noise with a rise of 1/f, one density for each channel."""
+
+    name = "coloured_floor"
+    parameters: tuple[Parameter, ...] = (
+        Parameter("density", "m/s^2/Hz^0.5", LogNormal(1e-3, 6.0, 1e-12, 1e3)),
+        Parameter("corner_hz", "Hz", LogNormal(30.0, 8.0, 0.011, 1e5)),
+    )
+    confused_with: tuple[tuple[str, str], ...] = (
+        ("tooth_wear", "a record of the machine at rest: noise of the chain stays, that of teeth does not"),
+        ("unit_or_gain_error", "the levels of lines: noise leaves them as they are"),
+    )
+
+    def applies(self, context: Context) -> bool:
+        """Wherever there are accelerometers."""
+        return bool(context.views)
+
+    def starts(self, context: Context) -> list[dict[str, float | str]]:
+        """The channels whose floor is lifted, the densities as shares of the clearest one's."""
+        found = by_channel(context, _floor, floor=True)
+        if not found:
+            return []
+        top = max(found.values(), key=lambda fit: fit.drop)
+        start: dict[str, float | str] = {
+            "density": float(top.values[0]),
+            "std:density": float(top.std[0]),
+            "corner_hz": float(np.clip(top.values[1], 0.011, 1e5)),
+            "std:corner_hz": float(top.std[1]),
+        }
+        return [start | {f"share:{c}": float(fit.values[0] / top.values[0]) for c, fit in found.items()}]
+
+    def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
+        """The content with that noise on the channels that have it."""
+        for key, share in values.items():
+            if key.startswith("share:"):
+                channel = key.removeprefix("share:")
+                density = float(values["density"]) * float(share)
+                content = with_sensor(content, channel, "noise_density", f"{density:.9g} m/s^2/Hz^0.5")
+                content = with_sensor(
+                    content, channel, "noise_corner", f"{float(values['corner_hz']):.9g} Hz"
+                )
+        return content
+
+    def signature(self, values: Values) -> str:
+        """In plain words."""
+        corner = float(values["corner_hz"])
+        rise = f", rising below {corner:.3g} Hz" if corner > 1 else ""
+        return f"between the lines a floor of {float(values['density']):.2g} m/s^2/sqrt(Hz){rise}"

@@ -1,0 +1,123 @@
+"""Resonance of a sensor on its mounting: one curve on all that it shows, whatever excites the machine."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_twin.causes.cause import Content, Parameter, Values
+from gearsim_twin.causes.edit import with_sensor
+from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.causes.spectra_beside import (
+    Beside,
+    CurveFit,
+    by_channel,
+    components,
+    fit_curve,
+    peaks_hz,
+    pooled,
+)
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+__all__ = ["SensorResonance", "mounted_db"]
+
+Array = NDArray[np.float64]
+
+_LEAST_DROP = 20.0
+_LEAST_SHARE = 0.15
+_VAGUE = 0.08  # of the resonance: an upper end that is merely different
+_AGREE = 0.06
+
+
+def mounted_db(frequency_hz: Array, resonance_hz: float, q: float) -> Array:
+    """What a sensor on its mounting reads over what moves under it (Serridge and Licht 1987), in dB."""
+    ratio = frequency_hz / resonance_hz
+    return np.asarray(-10 * np.log10((1 - ratio**2) ** 2 + (ratio / q) ** 2))
+
+
+def _resonance(data: Beside, sample_rate_hz: float) -> CurveFit | None:
+    """Frequency and Q, if the ratio has both the peak and the fall beyond it (or the rise towards it)."""
+    f = data.frequency_hz
+
+    def predicted(p: Array) -> Array:
+        return data.simulated_db + mounted_db(f, 10 ** p[0], 10 ** p[1])
+
+    top = float(np.log10(1.2 * sample_rate_hz))
+    places = [*peaks_hz(data), 0.55 * sample_rate_hz]
+    starts = [(float(np.log10(place)), q) for place in places for q in (0.7, 1.3)]
+    low = float(np.log10(max(100.0, f[2])))
+    fit = fit_curve(data, predicted, starts, ((low, -0.1), (top, 2.2)))
+    resonance, q = 10 ** fit.values[0], 10 ** fit.values[1]
+    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or q < 1.5:
+        return None
+    peak = (f > resonance / 1.12) & (f < resonance * 1.12)
+    ratio = data.ratio_db - fit.gain_db
+    # The peak itself must show where it lies in the band, and the fall behind it.
+    if peak.sum() >= 3 and float(ratio[peak].max()) < 3.0:
+        return None
+    beyond = f > 1.6 * resonance
+    if beyond.sum() >= 4 and float(np.median(ratio[beyond])) > -1.0:
+        return None
+    std = np.array([2.3026 * fit.std[0] * resonance, 2.3026 * min(fit.std[1], 2.0) * q])
+    if std[0] > _VAGUE * resonance:
+        return None
+    return CurveFit(np.array([resonance, q]), std, fit.gain_db, fit.drop, fit.share)
+
+
+class SensorResonance:
+    """A sensor on wax, a magnet or held by hand."""
+
+    name = "sensor_resonance"
+    parameters: tuple[Parameter, ...] = (
+        Parameter("resonance_hz", "Hz", LogNormal(8000.0, 2.5, 100.0, 1e5)),
+        Parameter("q", "1", LogNormal(12.0, 2.5, 0.5, 200.0)),
+    )
+    confused_with: tuple[tuple[str, str], ...] = (
+        ("casing_resonance", "the sensor moved to another place, or screwed on: a casing's peak stays"),
+        ("antialias_rolloff", "a record at a higher rate: a resonance is a peak before its fall"),
+    )
+
+    def applies(self, context: Context) -> bool:
+        """Wherever there are accelerometers."""
+        return bool(context.views)
+
+    def starts(self, context: Context) -> list[dict[str, float | str]]:
+        """The resonance that most channels share, and that of the clearest others."""
+        found = by_channel(context, _resonance)
+        channels = context.views[0].record.channels
+        starts: list[dict[str, float | str]] = []
+        for group in components(found, len(channels), 0, _AGREE)[:3]:
+            fits = [found[name] for name in group]
+            (resonance, std), (q, q_std) = pooled(fits, 0), pooled(fits, 1)
+            starts.append(
+                {
+                    "resonance_hz": resonance,
+                    "std:resonance_hz": std,
+                    "q": q,
+                    "std:q": q_std,
+                    "component": "all" if len(group) == len(channels) else ",".join(group),
+                }
+            )
+        return starts
+
+    def extend(self, content: Content, values: Values, context: Context) -> Content:
+        """The content with that mounting."""
+        component = str(values["component"])
+        names = context.views[0].record.channels if component == "all" else component.split(",")
+        mounting = {"resonance": f"{float(values['resonance_hz']):.9g} Hz", "q": float(values["q"])}
+        for channel in names:
+            content = with_sensor(content, channel, "mounting", mounting)
+        return content
+
+    def signature(self, values: Values) -> str:
+        """In plain words."""
+        which = "all channels" if values["component"] == "all" else str(values["component"])
+        return (
+            f"{which} show too much towards {float(values['resonance_hz']):.0f} Hz "
+            f"(Q {float(values['q']):.1f}) and too little above, in all lines and "
+            "noise alike: the sensor on its mounting"
+        )
