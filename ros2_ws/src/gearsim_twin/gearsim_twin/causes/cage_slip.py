@@ -113,12 +113,18 @@ def _start(component: str, found: Sequence[Deviation]) -> tuple[float, dict[str,
 
 
 def _spin_contradicts(one: Deviation) -> bool:
-    """Whether the elements spin otherwise than slip would have it: by the share of the cage."""
+    """Whether the elements spin otherwise than slip allows, wherever they slide.
+
+    Rolling on the outer race and sliding on the inner they lag as the cage does (the simulator's way);
+    rolling on the inner race and sliding on the outer they are faster by c / (2 - c) of that.
+    """
     motion = one.motion
     if not math.isfinite(motion.spin):
         return False
     off = motion.spin / one.spin - 1.0
-    return abs(off - one.share) > _SPIN_DOUBT * math.hypot(motion.spin_std / one.spin, one.std)
+    ends = (one.share, -one.share * motion.share / (2.0 - motion.share))
+    beyond = max(min(ends) - off, off - max(ends), 0.0)
+    return beyond > _SPIN_DOUBT * math.hypot(motion.spin_std / one.spin, one.std)
 
 
 def load_law(
