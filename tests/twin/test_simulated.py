@@ -44,6 +44,19 @@ def test_the_same_work_is_done_once_and_seeds_differ():
     assert content["seed"] == 1
 
 
+def test_what_was_not_asked_for_long_is_forgotten(monkeypatch: pytest.MonkeyPatch):
+    case = case_of("mfpt", "bearing5", rig_record())
+    with Simulator(case) as simulator:
+        content = scenario_content(case, simulator.measured[0])
+        (first,) = simulator.views({0: content}, 0.2)
+        monkeypatch.setattr("gearsim_twin.simulated._MOST_BYTES", 2 * first.nbytes)
+        (second,) = simulator.views({0: content}, 0.2, seed=2)
+        assert simulator.views({0: content}, 0.2)[0] is first  # the second is now the older one
+        simulator.views({0: content}, 0.2, seed=3)
+        assert simulator.views({0: content}, 0.2)[0] is first
+        assert simulator.views({0: content}, 0.2, seed=2)[0] is not second
+
+
 def test_what_the_simulator_refuses_is_named():
     case = case_of("mfpt", "bearing5", rig_record())
     with Simulator(case) as simulator:

@@ -26,6 +26,7 @@ def test_speed_and_angle_of_a_tacho():
     assert not view.issues
     signal = view.angle("b1_y", 256)
     assert signal is view.angle("b1_y", 256)
+    assert view.nbytes == view.record.data.nbytes + signal.values.nbytes
     assert signal.samples_per_turn == 256
     with pytest.raises(KeyError):
         view.signal("top")

@@ -157,7 +157,7 @@ class Simulator:
         """Keep a view, and drop those that were not asked for the longest."""
         self._kept[key] = view
         self._kept.move_to_end(key)
-        while len(self._kept) > 1 and sum(v.record.data.nbytes for v in self._kept.values()) > _MOST_BYTES:
+        while len(self._kept) > 1 and sum(v.nbytes for v in self._kept.values()) > _MOST_BYTES:
             self._kept.popitem(last=False)
 
 

@@ -79,6 +79,11 @@ class View:
         return self.speed.source
 
     @property
+    def nbytes(self) -> int:
+        """Memory of its samples and of what it keeps."""
+        return self.record.data.nbytes + sum(one.values.nbytes for one in self._kept.values())
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What is doubtful, a sentence each for people."""
         name = self.record.source or "record"
