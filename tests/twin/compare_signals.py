@@ -116,7 +116,7 @@ def features_of_replicates(kind: str, seeds: tuple[int, ...]) -> list[Features]:
         rng = np.random.default_rng(seed + 5000)
         one = with_encoder(record(x), ((1.0, 2e-3), (32.0, 5e-4), (64.0, 1e-4)))
         (train,) = one.encoders
-        shaken = np.sort(train.samples + 0.02 * rng.normal(size=train.samples.size))
+        shaken = np.sort(train.samples + 0.3 * rng.normal(size=train.samples.size))
         records.append(replace(one, encoders=(replace(train, samples=shaken),)))
     plan = plan_of(view(records[0]))
     return [measured(one, plan) for one in records]

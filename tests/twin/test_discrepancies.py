@@ -77,7 +77,7 @@ def test_false_discoveries_are_as_rare_as_asked():
 
 def test_neighbours_that_differ_together_are_one():
     level = np.zeros(44)
-    level[5:9], level[7], level[20:23], level[41:43] = 15.0, 1.0, -15.0, 20.0
+    level[5:9], level[7], level[9:12], level[41:43] = 15.0, 1.0, -15.0, 20.0
     both = (*BANDS, *LINES)
     found = discrepancies([compare(by_hand(both, level), by_hand(both, 0.0))])
     assert [(d.domain, len(d.places)) for d in found] == [("orders", 2), ("psd", 3), ("psd", 3)]

@@ -136,10 +136,23 @@ def test_families_that_are_not_there_say_nothing():
             assert np.isfinite(found.std_db[k]) == there
 
 
+@pytest.mark.parametrize("seed", [30, 31, 32])
+def test_lines_of_one_family_are_no_evidence_for_another(seed):
+    """On this bearing 2 BSF - FTF is within 1.5 % of BPFO, so regular strikes look like both."""
+    found = measured(record(0.3 * noise(seed) + lines() + impacts(seed, BPFO, jitter=0.0)))
+    clear = [
+        p.label for k, p in enumerate(found.places) if p.kind == "ratio" and np.isfinite(found.level_db[k])
+    ]
+    assert clear == [BPFO_LABEL]
+
+
 def test_an_averaged_burst_has_the_decay_and_the_frequency_of_its_resonance():
     found = measured(record(0.1 * noise(13) + impacts(13, BPFO)))
-    centre, _ = level(found, domain="transient", kind="centre", label=BPFO_LABEL)
-    assert 1e3 * 10 ** (centre / 10) == pytest.approx(RESONANCE_HZ, rel=0.05)
+    t = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
+    humming = measured(record(0.1 * noise(13) + impacts(13, BPFO) + 1.5 * np.sin(2 * np.pi * 2700.0 * t)))
+    for one in (found, humming):
+        centre, _ = level(one, domain="transient", kind="centre", label=BPFO_LABEL)
+        assert 1e3 * 10 ** (centre / 10) == pytest.approx(RESONANCE_HZ, rel=0.05)
     decay, _ = level(found, domain="transient", kind="decay", label=BPFO_LABEL)
     # (sum a)^2 / sum a^2 of exp(-2 t / tau) is tau; smoothing over 0.25 ms and the band's width lengthen it
     assert DECAY_S < 1e-3 * 10 ** (decay / 10) < 1.5 * DECAY_S
@@ -183,6 +196,13 @@ def test_unsteadiness_is_seen_where_it_is():
     up, down = (level(measured(record(x)), kind="asymmetry")[0] for x in (lopsided, -lopsided))
     assert up > 1.5
     assert down == pytest.approx(-up, abs=1e-6)
+
+
+def test_what_repeats_with_the_turn_does_not_make_a_level_unsure():
+    found = measured(record(lines(1.7, table=((1, 1.0), (2, 0.7)))))
+    for kind in ("rms", "kurtosis"):
+        _, std = level(found, domain="statistics", kind=kind, band_hz=None)
+        assert std == pytest.approx(0.03)
 
 
 def test_places_are_few_hundred_and_a_view_costs_less_than_half_a_second():
