@@ -1,0 +1,68 @@
+"""Looseness: the bolts of a pedestal hold no more; pressed it is stiff, lifted it is soft."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gearsim_twin.causes.cause import Content, Parameter, Values
+from gearsim_twin.causes.edit import with_fault
+from gearsim_twin.causes.gear_model import Part, parts_of
+from gearsim_twin.causes.matched import matches
+from gearsim_twin.causes.prior import Uniform
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+__all__ = ["Looseness"]
+
+_UNIT = 0.6
+_BOUNDS = (0.05, 0.95)
+_MOST = 3
+
+
+class Looseness:
+    """A pedestal's base that is softer while it lifts."""
+
+    name = "looseness"
+    parameters: tuple[Parameter, ...] = (Parameter("reduction", "1", Uniform(0.0, 0.95)),)
+    confused_with: tuple[tuple[str, str], ...] = (
+        (
+            "misalignment",
+            "the coupling opened, or the bolts of one foot tightened: which of both changes it; and the "
+            "direction across: a foot lifts one way, a coupling out of line shakes all round",
+        ),
+        (
+            "unbalance",
+            "levels at multiples of the speed, and whether one foot moves much more than the others",
+        ),
+        ("casing_resonance", "a run-up: what a foot does follows the speed, a resonance stays"),
+    )
+
+    def applies(self, context: Context) -> bool:
+        """Wherever bearings stand on pedestals."""
+        return bool(context.contents) and bool(parts_of(context.contents[0], "looseness"))
+
+    def starts(self, context: Context) -> list[dict[str, float | str]]:
+        """The feet whose lifting answers most, with the share of stiffness that is lost."""
+        parts = parts_of(context.contents[0], "looseness")
+        found = matches(context, parts, self._build, _UNIT, _BOUNDS)
+        return [{"component": match.part.name, "reduction": match.value} for match in found[:_MOST]]
+
+    def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
+        """With one loose foot, whose bolts just hold the static lift."""
+        return with_fault(
+            content, "looseness", str(values["component"]), {"reduction": float(values["reduction"])}
+        )
+
+    def signature(self, values: Values) -> str:
+        """Many multiples on one foot."""
+        return (
+            f"many multiples of the speed at the foot of {values['component']}, most of all in "
+            "the direction of "
+            f"lifting, where {100 * float(values['reduction']):.0f} % of the stiffness of its "
+            "base are missing"
+        )
+
+    @staticmethod
+    def _build(content: Content, part: Part, value: float) -> Content:
+        return with_fault(content, "looseness", part.name, {"reduction": value})

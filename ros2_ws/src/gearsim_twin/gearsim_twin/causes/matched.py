@@ -1,0 +1,268 @@
+"""How strong an effect is in a record: its simulated answer is laid over the deviation of the record.
+
+With the deviation D and the answer U of a guess (both complex lines of a turn, variance v), turned by the
+angle phi, the amplitude is a = Re sum conj(U) D / v over sum |U|^2 / v, and the drop of the weighted squares
+a^2 times the latter. Turning a wheel against its mates by whole teeth, or a run-out by any angle, turns lines
+around each multiple of the mesh by their distance m from it: exp(-2 pi i m phi).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsim_io.errors import InputError
+from gearsim_twin.causes.cause import Content
+from gearsim_twin.causes.gear_model import Part, has_planets
+from gearsim_twin.causes.turn_lines import Complex, Deviation, deviation, line_count, turn_lines
+from gearsim_twin.simulated import Simulator
+from gearsim_twin.view import View
+
+if TYPE_CHECKING:
+    from gearsim_twin.causes.context import Context
+
+__all__ = ["Match", "matches"]
+
+_TURNS = 4.2  # of a short simulation
+_LEAST_S = 0.3
+_SETTLING_S = 0.25  # how the machine starts is no part of an answer
+_LEAST_DROP = 30.0  # of chi^2: with the few hundred angles and parts looked at, once in thousands by chance
+_LEAST_SHARE = 0.05  # of all that deviates
+_STANDS_OUT = 10.0
+_LEAST_LINES = 2
+_LEAST_OF_PLANETS = 0.01
+_SHAPE = 0.25  # shapes of answers are right to about that part of what deviates
+_ANGLES = 72
+_AGAIN = 3
+_MOST_KEPT = 48
+_KEPT: WeakKeyDictionary[View, OrderedDict[tuple[str, float, float], Complex | None]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """An effect in a record.
+
+    Attributes
+    ----------
+    part : Part
+    value : float
+        Of the scaled parameter.
+    angle_turns : float
+        By how much its part stands ahead of where the guess has it, in turns of the part; 0 where no angle
+        was looked for.
+    drop : float
+        Of the weighted squares.
+    share : float
+        Of all that deviates: of the squares, or with no line counting for much more than others, whichever
+        is more.
+    sign : float
+        -1 where the effect is the opposite of the guess's.
+    """
+
+    part: Part
+    value: float
+    angle_turns: float
+    drop: float
+    share: float
+    sign: float = 1.0
+
+
+def matches(
+    context: Context,
+    parts: Sequence[Part],
+    build: Callable[[Content, Part, float], Content],
+    unit: float,
+    bounds: tuple[float, float],
+    *,
+    angle: str = "none",
+    power: float = 1.0,
+    signed: bool = False,
+    top: int | None = None,
+) -> list[Match]:
+    """Parts that may have an effect, the best first; empty where nothing speaks for any.
+
+    Parameters
+    ----------
+    context : Context
+    parts : sequence of Part
+        Twins are looked at once.
+    build : callable
+        (content, part, value) -> the content with the effect of that size, at angle zero or tooth 1.
+    unit : float
+        Size that is simulated first.
+    bounds : (low, high)
+        Of the size.
+    angle : str
+        "tooth", "any" or "none": how the effect may stand on its part; "power" where it leaves no phase.
+    power : float
+        The answer grows with the size to this power.
+    signed : bool
+        Whether the opposite effect exists.
+    top : int, optional
+        Lines of the turn of which at least two must deviate clearly; all by default.
+    """
+    effect = _Effect(build, bounds, angle, power, signed, top)
+    found = []
+    for record in _records(context):
+        first = [_match(context, record, part, effect, unit) for part in _once(parts)]
+        found += [match for match in first if match is not None and match.drop >= _LEAST_DROP / 2]
+    found.sort(key=lambda match: -match.drop)
+    if power != 1.0:  # the shape of the answer changes with the size
+        again = [_match(context, _records(context)[0], one.part, effect, one.value) for one in found[:_AGAIN]]
+        found = [match for match in again if match is not None]
+    return [match for match in found if match.drop >= _LEAST_DROP and match.share >= _LEAST_SHARE]
+
+
+@dataclass(frozen=True, slots=True)
+class _Effect:
+    """What `matches` looks for."""
+
+    build: Callable[[Content, Part, float], Content]
+    bounds: tuple[float, float]
+    angle: str
+    power: float
+    signed: bool
+    top: int | None
+
+
+def _once(parts: Sequence[Part]) -> list[Part]:
+    twins = [part for part in parts if part.twin]
+    return [part for part in parts if not part.twin or part is twins[0]]
+
+
+def _records(context: Context) -> list[int]:
+    """The record with most turns: enough for a first guess; none where no angle is known."""
+    numbers = [k for k, view in enumerate(context.views) if view.phase is not None]
+    return sorted(numbers, key=lambda k: -context.views[k].turns)[:1]
+
+
+def period(context: Context, record: int, part: Part) -> float:
+    """Turns, per turn of the reference shaft, of what is averaged: the part, or the carrier that it is on."""
+    whole = abs(part.turns - round(part.turns)) < 1e-9
+    return 1.0 if has_planets(context.contents[record]) and whole and part.turns > 0 else part.turns
+
+
+def _match(context: Context, record: int, part: Part, effect: _Effect, size: float) -> Match | None:
+    """The effect of one size on one part, scaled."""
+    turns = period(context, record, part)
+    own = deviation(context, record, turns)
+    if own is None or np.count_nonzero(own.excess[:, : effect.top] > _STANDS_OUT) < _least(
+        context, effect, own
+    ):
+        return None
+    content = effect.build(context.contents[record], part, size)
+    with_it = _lines(context, record, turns, content)
+    without = _lines(context, record, turns, context.contents[record])
+    if with_it is None or without is None:
+        return None
+    if effect.angle == "power":
+        match = _by_power(own, np.abs(with_it) ** 2 - np.abs(without) ** 2, part)
+    elif has_planets(content) and effect.angle != "none":
+        match = _by_power(own, np.abs(with_it - without) ** 2, part)
+    else:
+        per_turn = part.turns / turns
+        match = _by_angle(own, with_it - without, part, per_turn, effect.angle, effect.signed)
+    if match is None:
+        return None
+    return replace(match, value=float(np.clip(size * match.value ** (1.0 / effect.power), *effect.bounds)))
+
+
+def _least(context: Context, effect: _Effect, own: Deviation) -> int:
+    """Lines that must deviate before anything is simulated; drawn errors of planets let some deviate."""
+    if has_planets(context.contents[own.record]) and effect.angle != "none":
+        return max(_LEAST_LINES, round(_LEAST_OF_PLANETS * own.values.size))
+    return _LEAST_LINES
+
+
+def _by_angle(
+    own: Deviation, answer: Complex, part: Part, per_turn: float, angle: str, signed: bool
+) -> Match | None:
+    weight = np.where(np.isfinite(own.variance), 1.0 / own.variance, 0.0)
+    norm = float(np.sum(np.abs(answer) ** 2 * weight))
+    if norm <= 0:
+        return None
+    product = np.sum(np.conj(answer) * own.values * weight, axis=0)
+    angles, steps = _angles(part, per_turn, angle)
+    mesh = max(1, round(part.teeth * per_turn)) if part.teeth > 1 else product.size * 2
+    k = np.arange(product.size)
+    residue = (k + mesh // 2) % mesh - mesh // 2 if part.teeth > 1 else k
+    first = int(residue.min())
+    folded = np.bincount(residue - first, product.real) + 1j * np.bincount(residue - first, product.imag)
+    m = np.arange(first, first + folded.size)
+    corr = np.real(np.exp(2j * np.pi * np.outer(angles, m)) @ folded)
+    at = int(np.argmax(np.abs(corr) if signed else corr))
+    if corr[at] == 0 or (corr[at] < 0 and not signed):
+        return None
+    amplitude, drop = float(corr[at]) / norm, float(corr[at]) ** 2 / norm
+    turned = amplitude * answer * np.exp(-2j * np.pi * residue * angles[at])
+    plain = drop / max(float(np.sum(np.abs(own.values) ** 2 * weight)), 1e-300)
+    share = max(plain, _share(own, turned))
+    return Match(part, abs(amplitude), float(steps[at]), drop, share, math.copysign(1.0, amplitude))
+
+
+def _share(own: Deviation, answer: Complex) -> float:
+    """What an answer takes of the lines that deviate, none counting for more than shapes are right to."""
+    clear = (own.excess > _STANDS_OUT) | (np.abs(answer) ** 2 > _STANDS_OUT * own.variance)
+    if not np.any(clear):
+        clear = np.isfinite(own.variance)
+    weight = clear / (own.variance + (_SHAPE * np.abs(own.values)) ** 2)
+    total = float(np.sum(np.abs(own.values) ** 2 * weight))
+    left = float(np.sum(np.abs(own.values - answer) ** 2 * weight))
+    return 1.0 - left / max(total, 1e-300)
+
+
+def _angles(part: Part, per_turn: float, angle: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angles in turns of what is averaged, and of the part."""
+    count = {"tooth": part.teeth, "any": _ANGLES, "none": 1}[angle]
+    steps = np.arange(count) / count
+    return steps / per_turn, steps
+
+
+def _by_power(own: Deviation, square: NDArray[np.float64], part: Part) -> Match | None:
+    """Where drawn errors and turning sensors leave no phase: by the powers of the lines alone."""
+    variance = own.variance**2 + (_SHAPE * own.power) ** 2
+    weight = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
+    norm = float(np.sum(square**2 * weight))
+    total = float(np.sum(own.power**2 * weight))
+    corr = float(np.sum(square * own.power * weight))
+    if norm <= 0 or corr <= 0:
+        return None
+    drop = corr**2 / norm
+    return Match(part, math.sqrt(corr / norm), 0.0, drop, drop / max(total, 1e-300))
+
+
+def _lines(context: Context, record: int, turns: float, content: Content) -> Complex | None:
+    view = context.views[record]
+    seconds = min(
+        view.record.seconds, max(_LEAST_S, _TURNS / (min(turns, 1.0) * view.speed_hz)) + _SETTLING_S
+    )
+    kept = _KEPT.setdefault(view, OrderedDict())
+    key = (repr(content), round(seconds, 6), round(turns, 9))
+    if key not in kept:
+        kept[key] = _simulated(context, record, turns, content, seconds)
+    kept.move_to_end(key)
+    while len(kept) > _MOST_KEPT:
+        kept.popitem(last=False)
+    return kept[key]
+
+
+def _simulated(
+    context: Context, record: int, turns: float, content: Content, seconds: float
+) -> Complex | None:
+    view = context.views[record]
+    with Simulator(context.case, measured=context.views) as simulator:
+        try:
+            (made,) = simulator.views({record: content}, seconds)
+        except InputError:  # an effect of that size cannot be in this machine
+            return None
+    first = min(round(_SETTLING_S * made.record.sample_rate_hz), made.record.sample_count // 4)
+    made = made.part(first, made.record.sample_count)
+    lines = turn_lines(made, turns, line_count(view, turns), view.record.channels)
+    return None if lines is None else lines.values
