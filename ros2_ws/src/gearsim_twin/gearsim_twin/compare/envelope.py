@@ -82,7 +82,8 @@ def _of_family(
             label = f"{k} x {family.label}"
             found.append(Place("envelope", channel, "line", k * family.order, "order", width, label, band))
     if _sidebands(frame, family):
-        found.append(Place("envelope", channel, "sideband", family.order, "order", width, family.label, band))
+        name = f"sidebands of {family.label}"
+        found.append(Place("envelope", channel, "sideband", family.order, "order", width, name, band))
     return found
 
 

@@ -14,6 +14,9 @@ __all__ = ["Levels", "joined", "nothing"]
 
 Vector = NDArray[np.float64]
 
+_SILENT_DB = -2500.0
+"""Where nothing at all was measured; the least power that a float holds is -3000 dB."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Levels:
@@ -61,9 +64,9 @@ class Levels:
         bandwidth_hz: Vector | None = None,
         gauss_db: Vector | None = None,
     ) -> Levels:
-        """Levels with what is left out filled in; where the level is not finite the place says nothing."""
+        """Levels with what is left out filled in; where there is no level the place says nothing."""
         level = np.array(level_db, dtype=np.float64)
-        said = np.isfinite(level) & np.isfinite(std_db)
+        said = np.isfinite(level) & np.isfinite(std_db) & (level > _SILENT_DB)
 
         def filled(array: Vector | None, value: float) -> Vector:
             return np.full(level.size, value) if array is None else np.array(array, dtype=np.float64)

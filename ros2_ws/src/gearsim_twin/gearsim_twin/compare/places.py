@@ -90,7 +90,8 @@ class Place:
             return f"noise at {hz_text(self.at)}"
         if self.kind == "floor":
             return "floor"
-        head = "coherence at " if self.domain == "cyclic" else "line "
+        plain = name.startswith(("tone", "modulation", "sidebands"))
+        head = "coherence at " if self.domain == "cyclic" else "" if plain else "line "
         return f"{head}{name} ({self._position(speed_hz)})"
 
     def where(self) -> str:
