@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _LEAST_DROP = 15.0
 _LEAST_SHARE = 0.08
 _LEAST_PEAK_DB = 4.0
+_SAME = 0.1
 _FINE = 48  # bands in an octave
 _MASS = TypeAdapter(Annotated[float, Si("kg", gt=0)])
 _LOCAL_MASS_KG = 5.0  # where a model does not tell: pedestals and casings are of that size
@@ -63,9 +64,9 @@ def _resonance(data: Beside, sample_rate_hz: float) -> CurveFit | None:
     return CurveFit(values, 2.3026 * np.minimum(fit.std, 2.0) * values, fit.gain_db, fit.drop, fit.share)
 
 
-def _clearer(fit: CurveFit, other: CurveFit | None) -> bool:
-    """Whether a finer fit tells more than a coarser one; bands are four times as many."""
-    return other is None or fit.drop > 2 * other.drop
+def _near(one: CurveFit, other: CurveFit) -> bool:
+    """Whether two fits tell of one resonance."""
+    return abs(float(one.values[0] / other.values[0]) - 1) < _SAME
 
 
 class CasingResonance:
@@ -94,16 +95,21 @@ class CasingResonance:
         # A light mass moves a site within a few per cent of one frequency, a heavy one over an octave.
         coarse = by_channel(context, _resonance)
         fine = by_channel(context, _resonance, per_octave=_FINE)
-        found = coarse | {name: fit for name, fit in fine.items() if _clearer(fit, coarse.get(name))}
-        clearest = sorted(found, key=lambda name: -found[name].drop)[:3]
+        trials = [(fit.drop, name, fit) for name, fit in coarse.items()]
+        # Four times the bands, half of them alike: twice the drop for the same.
+        trials += [(0.5 * fit.drop, name, fit) for name, fit in fine.items()]
+        kept: list[tuple[str, CurveFit]] = []
+        for _, name, fit in sorted(trials, key=lambda trial: -trial[0]):
+            if not any(name == site and _near(fit, other) for site, other in kept):
+                kept.append((name, fit))
         return [
             {
-                "frequency_hz": float(found[name].values[0]),
-                "damping_ratio": float(np.clip(found[name].values[2], 1e-3, 0.5)),
-                "mass_kg": float(found[name].values[1]) * local_mass_kg(context, name),
+                "frequency_hz": float(fit.values[0]),
+                "damping_ratio": float(np.clip(fit.values[2], 1e-3, 0.5)),
+                "mass_kg": float(fit.values[1]) * local_mass_kg(context, name),
                 "component": name,
             }
-            for name in clearest
+            for name, fit in kept[:4]
         ]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

@@ -28,6 +28,8 @@ __all__ = ["MislabelledRecord", "Other", "another_machine"]
 Array = NDArray[np.float64]
 
 _FAR = 0.7  # natural logarithm of a factor of two in speed
+_SIMPLE = (2.0, 3.0, 4.0, 1 / 2, 1 / 3, 1 / 4)
+_SIMPLE_ERROR = 0.03  # tolerance of speeds on nameplates
 _RATIO_ERROR = 2e-3
 _TOP_ORDER = 420.0
 _SIDE = (-5, -4, -3, -2, 2, 3, 4, 5)
@@ -116,6 +118,10 @@ class MislabelledRecord:
             if contradicted and view.record.tachos:
                 ratio = speed / _counted_hz(view)
                 starts.append({"speed_ratio": ratio, "component": "tacho", "speed_hz": speed, **sure})
+            elif known and (simple := _simple(view, speed / nominal)):
+                # Nothing in the vibration decides: other pulses in a turn are likelier than such a speed.
+                true_hz = speed / simple
+                starts.append({"speed_ratio": 1 / simple, "speed_hz": true_hz, "component": "tacho", **sure})
             elif known and abs(speed / nominal - 1) > LARGEST:
                 ratio = speed / nominal
                 starts.append({"speed_ratio": ratio, "component": "speed", "speed_hz": speed, **sure})
@@ -180,6 +186,14 @@ class MislabelledRecord:
                 "stated: the record is of another run"
             )
         return f"the tooth meshes are those of {component}: the record is of another machine"
+
+
+def _simple(view: View, ratio: float) -> float:
+    """The whole number (or one over it) that a doubtful angle signal is off by; 0 if it is none."""
+    if not any(issue.issue == "angle_doubtful" for issue in view.issues):
+        return 0.0
+    fits = [simple for simple in _SIMPLE if abs(ratio / simple - 1) < _SIMPLE_ERROR]
+    return fits[0] if fits else 0.0
 
 
 def _counted_hz(view: View) -> float:
