@@ -36,7 +36,6 @@ TAU_DB = {
 """That scatter, as measured between a model and itself with other random errors of teeth and numbers a few
 per cent off: single lines of orders depend on which tooth is how wrong, wide bands do not."""
 _FIRST_SHARE = 0.3
-_NO_TAU_DB = 0.02
 # What one healthy machine tells is known no better than this: another day, another load.
 _LEAST_FACTOR, _LEARNT_TAU_FACTOR, _LESS_SURE = 1.02, 1.3, 1.5
 
@@ -75,7 +74,7 @@ class Prior:
         return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread))
 
     def _tau(self, domain: str) -> float:
-        return _NO_TAU_DB if domain == ASSUMED else self.tau_db.get(domain, TAU_DB[domain])
+        return 1.0 if domain == ASSUMED else self.tau_db.get(domain, TAU_DB[domain])
 
 
 def plain_prior(tuning: Tuning) -> Prior:

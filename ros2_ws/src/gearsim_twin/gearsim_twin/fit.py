@@ -19,13 +19,22 @@ from gearsim_twin.workbench import Trial, Workbench
 
 __all__ = ["Fitted", "fit", "fit_tuning", "judged"]
 
-_STEPS = 3
+_STEPS = 4
+# Lengths of a step that are tried, two at a time.
+_PARTS = ((1.0, 3.0), (0.3, 0.1))
 # Longest step, in standard deviations of the prior: beyond, levels are no longer linear in the parameters.
 _LONGEST = 1.5
 # A step shorter than this part of the posterior's standard deviation changes nothing that could be seen.
 _SHORT = 0.25
 _TUNING_STEP = 0.5
 _PLAIN_STEP = 0.25
+# So far behind another cause none catches up with it.
+_HOPELESS_NATS = 60.0
+# Levels that change by more from one simulation to its neighbour (notches, lines that sink into noise) do not
+# change in proportion.
+_LINEAR_DB = 3.0
+# How far off, and in how many parameters, a fit looks for a better start.
+_AROUND, _MOST_AROUND = 0.8, 2
 # After a longer step than this, slopes are taken anew.
 _FAR = 0.3
 
@@ -84,7 +93,9 @@ def judged(yard: Yardstick, trial: Trial, slopes: Array) -> Fitted:
     return Fitted(trial, slopes, posterior, value + posterior.volume)
 
 
-def fit(bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array) -> Fitted:
+def fit(
+    bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array, rival: float = -np.inf
+) -> Fitted:
     """The last cause of a model fitted to the training records, everything else adapting to it.
 
     Parameters
@@ -94,12 +105,17 @@ def fit(bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array) ->
         Of the model with the cause as first guessed.
     known_slopes : ndarray, shape (n, q)
         Of the coordinates of the model without its last cause.
+    rival : float
+        Evidence of the best other cause: one that stays far behind it is not followed to its end.
     """
-    best, own = first, first.model.own[-1]
+    best, own = _best_around(bench, yard, first), first.model.own[-1]
+    first = best
     slopes = _with_own(bench, first, known_slopes)
     at = np.array(first.model.coordinates, dtype=np.float64)
     value = yard.value(first.levels, at)
     for turn in range(_STEPS):
+        if turn and value < rival - _HOPELESS_NATS:
+            break
         posterior = yard.posterior(best.levels, slopes, at)
         step = _held(posterior.coordinates - at)
         spread = np.sqrt(np.diag(posterior.covariance))
@@ -114,15 +130,31 @@ def fit(bench: Workbench, yard: Yardstick, first: Trial, known_slopes: Array) ->
     return judged(yard, best, slopes)
 
 
+def _best_around(bench: Workbench, yard: Yardstick, first: Trial) -> Trial:
+    """The first guess, or one some way off in a single parameter: likelihoods may have several hills."""
+    last = first.model.extensions[-1]
+    here = np.array(last.coordinates)
+    models = [
+        _beside(first.model, here, k, side * _AROUND)
+        for k in range(min(here.size, _MOST_AROUND))
+        for side in (-1.0, 1.0)
+    ]
+    trials = [first, *(each for each in bench.trials(models) if not each.refused)]
+    values = [yard.value(each.levels, np.array(each.model.coordinates)) for each in trials]
+    return trials[int(np.argmax(values))]
+
+
 def _search(
     bench: Workbench, yard: Yardstick, best: Trial, at: Array, step: Array, value: float
 ) -> tuple[Trial | None, float, Array]:
-    """The whole step, or a third of it, if it is an improvement."""
-    for part in (1.0, 0.33):
-        (trial,) = bench.trials([best.model.at(at + part * step)])
-        found = yard.value(trial.levels, at + part * step)
-        if found > value:
-            return trial, found, part * step
+    """The best of some lengths of a step, short ones only where the longer ones are no improvement."""
+    for parts in _PARTS:
+        trials = bench.trials([best.model.at(at + part * step) for part in parts])
+        values = [yard.value(each.levels, np.array(each.model.coordinates)) for each in trials]
+        k = int(np.argmax(values))
+        if values[k] > value:
+            moved = np.array(trials[k].model.coordinates) - at
+            return trials[k], values[k], moved
     return None, value, np.zeros_like(step)
 
 
@@ -171,7 +203,7 @@ def _step(parameter: Parameter, value: float, coordinate: float) -> float:
 def _slopes(trial: Trial, beside: list[Trial], steps: Array) -> Array:
     """Differences of levels over steps, shape (n, steps); 0 where there is no level."""
     columns = [
-        np.nan_to_num(other.levels.level_db - trial.levels.level_db) / step
+        np.clip(np.nan_to_num(other.levels.level_db - trial.levels.level_db), -_LINEAR_DB, _LINEAR_DB) / step
         for other, step in zip(beside, steps, strict=True)
     ]
     return np.stack(columns, axis=1) if columns else np.zeros((trial.levels.level_db.size, 0))

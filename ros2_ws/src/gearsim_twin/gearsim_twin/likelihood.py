@@ -10,6 +10,9 @@ that explains any difference anywhere, at the price of log(1 / pi) and of a dens
 must explain differences more cheaply than that, and halving a large difference earns it next to nothing.
 tau and pi are found per domain for each model, so a model that explains a domain may claim to be sharper.
 
+What is assumed of the measuring chain is normal: a gain that is off by 17 standard deviations is no outlier
+but a cause of its own.
+
 Log likelihoods are multiplied by the share of differences that are independent (see `dependence`).
 """
 
@@ -22,7 +25,7 @@ from scipy.sparse import csr_array
 from scipy.special import gammaln
 
 from gearsim_twin.dependence import independent_share
-from gearsim_twin.stack import Array, Levels, Stack
+from gearsim_twin.stack import ASSUMED, Array, Levels, Stack
 
 __all__ = ["TAU_FACTOR", "Noise", "Posterior", "Yardstick"]
 
@@ -108,8 +111,11 @@ class Yardstick:
         count = len(self.stack.domains)
         tau, outlying, best = np.zeros(count), np.zeros(count), np.zeros(count)
         told = np.isfinite(residual_db)
-        for d in range(count):
+        for d, name in enumerate(self.stack.domains):
             mine = told & (self.stack.domain == d)
+            if name == ASSUMED:
+                best[d] = float(_gauss(residual_db[mine], variance_db2[mine]).sum())
+                continue
             grid = self.tau_median_db[d] * self.tau_factor[d] ** _TAU_STEPS
             core, wide = densities(residual_db[mine], variance_db2[mine] + grid[:, None] ** 2)
             terms = np.log(core[:, None] + _OUTLYING[:, None] * (wide - core)[:, None])
@@ -125,8 +131,14 @@ class Yardstick:
         s2 = np.where(told, variance_db2, 1.0) + noise.tau_db[self.stack.domain] ** 2
         core, wide = densities(np.where(told, residual_db, 0.0), s2)
         outlying = noise.outlying[self.stack.domain]
-        terms = np.log(core + outlying * (wide - core)) * self.share[self.stack.domain]
+        mixed = np.log(core + outlying * (wide - core)) * self.share[self.stack.domain]
+        terms = np.where(self.is_assumed, _gauss(np.where(told, residual_db, 0.0), variance_db2), mixed)
         return np.where(told, terms, self._quiet(told))
+
+    @property
+    def is_assumed(self) -> np.ndarray:
+        """Which places are assumptions."""
+        return np.asarray(np.array(self.stack.domains)[self.stack.domain] == ASSUMED)
 
     def _quiet(self, told: np.ndarray) -> Array:
         """Log likelihood of places where neither side has anything: they agree, whatever tau is."""
@@ -251,7 +263,14 @@ class Yardstick:
             if np.any(mine):
                 spread = max(float(np.mean(psi2[mine])), 0.1)
                 efficiency[d] = max(float(np.mean(bend[mine])), 0.05) ** 2 / spread
-        return weight, share * efficiency[domain] / s2
+        plain = np.where(told, 1.0 / s2, 0.0)
+        assumed = self.is_assumed
+        return np.where(assumed, plain, weight), np.where(assumed, plain, share * efficiency[domain] / s2)
+
+
+def _gauss(residual_db: Array, s2: Array) -> Array:
+    """Log density of what is assumed: no share of it is given up as unknown."""
+    return np.asarray(-0.5 * np.log(2.0 * np.pi * s2) - 0.5 * residual_db**2 / s2)
 
 
 def densities(residual_db: Array, s2: Array) -> tuple[Array, Array]:

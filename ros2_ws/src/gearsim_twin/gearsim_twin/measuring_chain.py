@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearsim_twin.compare.chains import ChannelNuisance, Nuisance, apply
+from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan
 from gearsim_twin.compare.nuisances import Limits, fit_nuisances
 from gearsim_twin.stack import Assumed
@@ -25,6 +26,9 @@ GAIN_STD_DB, TOP_STD_DB, COLOUR_STD_DB = 1.0, 1.0, 6.0
 _UNKNOWN_GAIN_DB = 10.0
 _FEWEST_BANDS, _NOISY_DB = 4, 3.0
 _MOST_DB = 60.0
+_STIFF_DB = 0.1
+# Of the places compared, how many are independent differences: as yardsticks begin with.
+_SHARE = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,14 +51,45 @@ class MeasuringChain:
     assumed: tuple[Assumed, ...]
 
     def fit(self, pairs: Sequence[tuple[Features, Features]]) -> tuple[Nuisance, tuple[float, ...]]:
-        """The best chain for (measured, simulated) features of some records, with what it needed."""
-        found = fit_nuisances(pairs, self.limits)
+        """The best chain for (measured, simulated) features of some records, with what it needed.
+
+        Per channel the better of two, by the differences that it leaves and by what it costs: one with gain
+        and bandwidth as the levels want them, and one with a floor alone. The former may make up for what a
+        model lacks altogether by a gain that no sensor has.
+        """
+        free = fit_nuisances(pairs, self.limits)
+        stiff = fit_nuisances(pairs, Limits(gain_std_db=_STIFF_DB))
+        chains: list[ChannelNuisance] = []
         corrections: list[float] = []
         for channel in self.channels:
-            chain = found.of(channel)
-            loss = 10.0 * math.log10(1.0 + (self.top_hz / chain.corner_hz) ** 4)
-            corrections += [chain.gain_db, loss, _colour_db(chain, [simulated for _, simulated in pairs])]
-        return found, tuple(float(np.clip(each, -_MOST_DB, _MOST_DB)) for each in corrections)
+            plain = replace(stiff.of(channel), gain_db=0.0, corner_hz=math.inf)
+            rivals = [(chain, self._needs(chain, pairs)) for chain in (free.of(channel), plain)]
+            chain, needs = min(rivals, key=lambda rival: self._cost(rival[0], rival[1], pairs))
+            chains.append(chain)
+            corrections += needs
+        rest = tuple(chain for chain in free.channels if chain.channel not in self.channels)
+        return Nuisance((*chains, *rest)), tuple(corrections)
+
+    def _needs(self, chain: ChannelNuisance, pairs: Sequence[tuple[Features, Features]]) -> tuple[float, ...]:
+        """Gain, loss at the top and colour of the floor that a chain has, dB."""
+        loss = 10.0 * math.log10(1.0 + (self.top_hz / chain.corner_hz) ** 4)
+        needs = (chain.gain_db, loss, _colour_db(chain, [simulated for _, simulated in pairs]))
+        return tuple(float(np.clip(each, -_MOST_DB, _MOST_DB)) for each in needs)
+
+    def _cost(
+        self,
+        chain: ChannelNuisance,
+        needs: tuple[float, ...],
+        pairs: Sequence[tuple[Features, Features]],
+    ) -> float:
+        """Minus log likelihood of the differences that it leaves, and of what it needs, in nats."""
+        stds = [each.std_db for each in self.assumed if each.channel == chain.channel]
+        cost = 0.5 * sum((need / std) ** 2 for need, std in zip(needs, stds, strict=True))
+        for measured, simulated in pairs:
+            mine = np.array([place.channel == chain.channel for place in measured.places])
+            compared = compare(measured.where(mine), apply(Nuisance((chain,)), simulated.where(mine)))
+            cost -= _SHARE * compared.loglike
+        return cost
 
     def apply(self, nuisance: tuple[Nuisance, tuple[float, ...]], simulated: Features) -> Features:
         """Simulated features as the chain would show them."""
@@ -74,7 +109,7 @@ def measuring_chain(plan: Plan, levels_known: bool) -> MeasuringChain:
         for channel in channels
         for kind, std in (("gain", gain), ("top", TOP_STD_DB), ("colour", COLOUR_STD_DB))
     )
-    limits = Limits() if levels_known else Limits(gain_std_db=_UNKNOWN_GAIN_DB)
+    limits = Limits(gain_std_db=gain)
     return MeasuringChain(channels, plan.frame.top_hz, limits, assumed)
 
 

@@ -99,7 +99,8 @@ def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
     if trial.model.extensions[-1].free:
         for strength in _STRENGTHS:
             power = np.maximum(below + strength * (above - below), 1e-3 * np.minimum(below, above))
-            candidates.append(replace(trial.levels, level_db=10.0 * np.log10(power)))
+            level = np.where(yard.is_assumed, trial.levels.level_db, 10.0 * np.log10(power))
+            candidates.append(replace(trial.levels, level_db=level))
     adapted = [yard.adapted(levels, base.slopes, base.at, noise) for levels in candidates]
     values = [
         float(yard.loglike(yard.residual(levels), yard.variance(levels), noise).sum()) - 0.5 * float(at @ at)

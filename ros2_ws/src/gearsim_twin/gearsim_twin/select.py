@@ -126,10 +126,11 @@ def _round(
     search.tell(f"trying {len(guesses)} first guesses")
     screened = screen(search.bench, yard, current, guesses)
     chosen = _worth_fitting(screened, search.settings)
-    fits = []
+    fits: list[tuple[Fitted, int]] = []
     for each in chosen:
         search.tell(f"fitting {each.extension.cause.name}")
-        fits.append((fit(search.bench, yard, each.trial, current.slopes), each.guesses))
+        best = max([found.evidence for found, _ in fits], default=-math.inf)
+        fits.append((fit(search.bench, yard, each.trial, current.slopes, best), each.guesses))
     yard, current, fits = _same_measure(yard, current, fits)
     candidates = _probable(search.settings, current, fits, names)
     candidates, accepted = _held_out(search, yard, current, candidates, len(rounds))

@@ -8,7 +8,7 @@ from gearsim_twin.compare.merged import Discrepancy
 
 __all__ = ["describe_rest", "material"]
 
-_MOST = 6
+_MOST = 8
 # A difference of a few decibels at one place is what models of machines err by.
 _LEAST_DB, _LEAST_Z = 3.0, 4.0
 
@@ -19,7 +19,8 @@ def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
 
 
 def describe_rest(rest: Sequence[Discrepancy]) -> str:
-    """The signature of what is left, in plain words with frequencies and orders."""
-    told = "; ".join(each.words() for each in rest[:_MOST])
+    """The signature of what is left, in plain words with frequencies and orders; what is in excess first."""
+    first = sorted(rest, key=lambda each: (each.size_db < 0, -abs(each.z)))
+    told = "; ".join(each.words() for each in first[:_MOST])
     more = len(rest) - _MOST
     return told + (f"; and {more} more" if more > 0 else "")
