@@ -81,8 +81,9 @@ def test_nothing_is_guessed_from_sound_bearings(rig, seed):
     assert [start for cause in GUESSING for start in cause.starts(context)] == []
 
 
-def test_what_the_model_has_already_is_not_guessed_again():
-    spall = fault("hit_sq", "outer_race_spall")
+@pytest.mark.parametrize("kind", ["outer_race_spall", "wide_spall"])
+def test_what_the_model_has_already_is_not_guessed_again(kind):
+    spall = fault("hit_sq", kind)
     context = context_of("hit_sq", record_of("hit_sq", spall, seed=5), changed={"faults": [spall]})
     assert [start for cause in GUESSING for start in cause.starts(context)] == []
 
@@ -196,6 +197,17 @@ def test_another_number_of_elements_is_seen():
     extended = BearingGeometry().extend(context.contents[0], start, context)
     assert seat_of(extended, "test_bearing").law.balls_per_row == 8
     runs(extended)
+
+
+def test_the_force_on_a_bearing_goes_with_the_load():
+    """A spur gear's force on its bearings is the torque over the base radius, beside some weight."""
+    forces = [
+        force_n(
+            {"machine": "unsw_parallel", "model": "lpm34", "operating_point": {"load": load}}, "bearing_3"
+        )
+        for load in ("25 N*m", "50 N*m", "100 N*m")
+    ]
+    assert np.diff(np.log2(forces)) == pytest.approx([1.0, 1.0], abs=0.05)
 
 
 def test_slip_that_falls_with_the_load_is_told_by_two_loads():

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearsim_dsp.kinematics import bearing_orders
 from gearsim_io.errors import InputError
+from gearsim_io.nameplate import Machine
 from gearsim_sim.scenario import parse_scenario
 from gearsim_twin.causes.cause import Content
 
@@ -18,18 +20,27 @@ if TYPE_CHECKING:
     from gearsim_sim.model.bearing_seat import BearingSeat
     from gearsim_sim.model.plant import Plant
 
-__all__ = ["DEFECTS", "bearings_of", "fault_of", "force_n", "most_growth_m", "seat_of"]
+__all__ = [
+    "DEFECTS",
+    "alike",
+    "bearings_of",
+    "fault_of",
+    "force_n",
+    "has_defect",
+    "most_growth_m",
+    "seat_of",
+]
 
-DEFECTS = (
-    "outer_race_spall",
-    "inner_race_spall",
-    "rolling_element_spall",
-    "wide_spall",
-    "extended_roughness",
-    "race_waviness",
-    "ball_waviness",
-)
-"""Faults of the simulator that put lines of a bearing into the envelope."""
+DEFECTS = {
+    "outer_race_spall": "outer_race",
+    "inner_race_spall": "inner_race",
+    "rolling_element_spall": "rolling_element",
+    "ball_waviness": "rolling_element",
+    "wide_spall": "outer_race",
+    "extended_roughness": "inner_race",
+    "race_waviness": "inner_race",
+}
+"""Faults of the simulator that put lines of a bearing into the envelope, and whose; `race` may differ."""
 _SOURCE = Path("model")
 _GROWTHS_M = np.geomspace(0.5e-6, 200e-6, 61)
 
@@ -53,6 +64,23 @@ def fault_of(content: Content, kind: str, component: str) -> Mapping[str, Any] |
         if fault["kind"] == kind and fault["component"] == component:
             return {"severity": fault.get("severity", 1.0), **fault.get("params", {})}
     return None
+
+
+def has_defect(content: Content, components: Iterable[str], fault: str) -> bool:
+    """Whether one of some bearings has a defect in the content that gives the lines of `fault`."""
+    wanted = set(components)
+    for each in content.get("faults", ()):
+        if each["component"] in wanted and each["kind"] in DEFECTS:
+            race = each.get("params", {}).get("race")
+            if fault == (f"{race}_race" if race else DEFECTS[each["kind"]]):
+                return True
+    return False
+
+
+def alike(machine: Machine, component: str) -> list[str]:
+    """Bearings of the nameplate with the same lines, itself among them."""
+    orders = {b.name: bearing_orders(b, machine.shaft(b.shaft).ratio) for b in machine.bearings}
+    return [name for name, own in orders.items() if own == orders[component]]
 
 
 def force_n(content: Content, component: str) -> float:

@@ -36,7 +36,7 @@ class BearingSpallBall:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The bearing whose lines at twice the BSF stand out most, then those alike in their lines."""
-        signs = candidates(context, "rolling_element", _KIND)
+        signs = candidates(context, "rolling_element")
         return width_starts(context, signs) if signs else []
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_dsp.kinematics import bearing_orders
-from gearsim_twin.causes.bearing_model import DEFECTS, bearings_of, fault_of, force_n, seat_of
+from gearsim_twin.causes.bearing_model import DEFECTS, alike, bearings_of, fault_of, force_n, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, signs_of
 from gearsim_twin.causes.cause import Content
 
@@ -181,18 +180,10 @@ def movable(context: Context) -> list[str]:
     Where the model has a defect in one of several bearings with the same lines, the lines are of that one.
     """
     content, machine = context.contents[0], context.case.machine
-    known = bearings_of(content)
-    orders = {
-        bearing.name: bearing_orders(bearing, machine.shaft(bearing.shaft).ratio)
-        for bearing in machine.bearings
-        if bearing.name in known
-    }
-    spoilt = [name for name in orders if any(fault_of(content, kind, name) for kind in DEFECTS)]
-    return [
-        name
-        for name in orders
-        if name in spoilt or not any(orders[name] == orders[other] for other in spoilt)
-    ]
+    named = {bearing.name for bearing in machine.bearings}
+    known = [name for name in bearings_of(content) if name in named]
+    spoilt = {name for name in known if any(fault_of(content, kind, name) for kind in DEFECTS)}
+    return [name for name in known if name in spoilt or not spoilt & set(alike(machine, name))]
 
 
 def united_std(values: NDArray[np.float64], std: NDArray[np.float64]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from gearsim_twin.causes.bearing_model import bearings_of, fault_of, seat_of
+from gearsim_twin.causes.bearing_model import alike, bearings_of, has_defect, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, size_of, unexplained_signs
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
@@ -42,14 +42,14 @@ def has_bearings(context: Context) -> bool:
     return bool(named & set(bearings_of(context.contents[0])))
 
 
-def candidates(context: Context, fault: str, kind: str) -> list[tuple[int, Sign]]:
-    """Unexplained signs of bearings that the model has, and without that kind of fault as yet."""
-    content = context.contents[0]
+def candidates(context: Context, fault: str) -> list[tuple[int, Sign]]:
+    """Unexplained signs of bearings that the model has, where no defect of it gives these lines already."""
+    content, machine = context.contents[0], context.case.machine
     known = bearings_of(content)
     return [
         (record, sign)
         for record, sign in unexplained_signs(context, fault)
-        if sign.component in known and fault_of(content, kind, sign.component) is None
+        if sign.component in known and not has_defect(content, alike(machine, sign.component), fault)
     ]
 
 
@@ -117,7 +117,7 @@ class RaceSpall:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The bearing whose lines stand out most, as wide as its events tell; then those alike in lines."""
-        signs = candidates(context, self.fault, self.kind)
+        signs = candidates(context, self.fault)
         if not signs:
             return []
         record, sign = signs[0]

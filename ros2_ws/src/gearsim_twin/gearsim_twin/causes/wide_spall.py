@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gearsim_sim.model.pit import race_edge
-from gearsim_twin.causes.bearing_model import fault_of, seat_of
-from gearsim_twin.causes.bearing_signs import Sign
+from gearsim_twin.causes.bearing_model import seat_of
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
@@ -56,8 +55,7 @@ class WideSpall:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The race whose lines stand out most, as long as two separate events tell."""
-        signs = [each for fault in _RACES for each in candidates(context, fault, _KIND)]
-        signs = [each for each in signs if not _has_spall(context, each[1])]
+        signs = [each for fault in _RACES for each in candidates(context, fault)]
         found: list[dict[str, float | str]] = []
         for number, (record, sign) in enumerate(sorted(signs, key=lambda each: -each[1].weight)):
             diameter = context.case.machine.bearing(sign.component).element_diameter_m
@@ -92,8 +90,3 @@ class WideSpall:
             f"{values['race']} race of {values['component']}, {1e3 * float(values['length_m']):.2g} mm long "
             f"and {1e6 * float(values['depth_m']):.2g} um deep"
         )
-
-
-def _has_spall(context: Context, sign: Sign) -> bool:
-    """Whether the model has a localised spall there: the same lines would be explained twice."""
-    return fault_of(context.contents[0], f"{sign.fault}_spall", sign.component) is not None
