@@ -19,6 +19,7 @@ from gearsim_twin.causes import CAUSES, Context
 from gearsim_twin.causes.clipping import find_limit
 from gearsim_twin.causes.dropouts import find_bursts
 from gearsim_twin.causes.inverter_lines import line_ratio
+from gearsim_twin.causes.lines import SlowPart
 from gearsim_twin.causes.sensor_resonance import mounted_db
 from gearsim_twin.causes.unit_or_gain_error import known_factor
 from gearsim_twin.view import view_of
@@ -271,3 +272,35 @@ def _alone(measured: Any, machine: str) -> Context:
     silent = dataclasses.replace(measured, data=noise * np.float32(1e-9))
     model = dataclasses.replace(view, record=silent)
     return Context(None, (view,), (), (), (), ({},), (model,))  # type: ignore[arg-type]
+
+
+def test_hum_a_line_beside_an_order_keeps_its_amplitude_and_frequency() -> None:
+    """An order fifty times as high, one line away, of a shaft whose speed wanders a little."""
+    rate, seconds = 2000.0, 4.0
+    t = np.arange(int(rate * seconds)) / rate
+    turns = 9.96 * t + 2e-3 * np.sin(2 * np.pi * 0.4 * t)
+    hum = 0.1 * np.cos(2 * np.pi * 60.01 * t + 1.0)
+    x = 5.0 * np.cos(2 * np.pi * 6 * turns) + hum + 1e-3 * np.random.default_rng(3).standard_normal(t.size)
+    slow = SlowPart(x, rate, turns, (1.0,))
+    assert slow.amplitude(60.01) == pytest.approx(0.1, rel=0.02)
+    frequency, _ = slow.refine(59.9, {1: 1e4})
+    assert frequency == pytest.approx(60.01, abs=5e-3)
+
+
+def test_short_dropouts_are_counted_with_those_too_short_to_see() -> None:
+    """Mean length 20 samples, the shortest that can be seen 6: a quarter of them is not."""
+    draws = np.random.default_rng(4)
+    x = draws.standard_normal(1_000_000)
+    at = 0.0
+    while True:
+        at += draws.exponential(500.0)
+        end = at + draws.exponential(20.0)
+        if end >= x.size:
+            break
+        x[int(np.ceil(at)) : int(np.ceil(end))] = 0.0
+        at = end
+    bursts = find_bursts(x, 1000.0)
+    assert bursts is not None
+    # Some 1,400 bursts are seen: 2.7 % of their mean length, three times that.
+    assert bursts.duration_s == pytest.approx(0.020, rel=0.08)
+    assert bursts.rate_hz == pytest.approx(2.0, rel=0.08)

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gearsim_dsp.speed import Phase, ShaftSpeed
 from gearsim_io.importers import import_file
 from gearsim_io.machines import load_machine
-from gearsim_io.record import PulseTrain
+from gearsim_io.record import PulseTrain, Record
 from gearsim_sim.scenario import parse_scenario
 from gearsim_twin.causes import CAUSES, Context
 from gearsim_twin.causes.casing_resonance import absorber_db
 from gearsim_twin.causes.shaft_speed_offset import stretch_between
 from gearsim_twin.causes.speed_fluctuation import course_of, swing_of
-from gearsim_twin.view import view_of
+from gearsim_twin.view import View, view_of
 from tests.twin.chain_cases import BASES, context, healthy, record
 
 LOAD_NM = {"parallel": 50.0, "planetary": 46.875}
@@ -209,3 +210,18 @@ def test_the_speed_of_a_bearing_rig_without_tacho_is_off_its_nameplate(
     swing = swing_of(view)
     assert swing is None or swing.relative < 1e-4
     assert 0.98 < view.speed_hz / 25.0 < 1.0
+
+
+def test_the_swing_of_a_long_record_is_that_of_its_course() -> None:
+    """A tacho of 40 pulses over 200 s: some 800 independent values of a swing of 2 Hz."""
+    time_s = np.arange(0.0, 200.0, 1e-3)
+    speed_hz = 10.0 * (1 + 0.005 * course_of(time_s, 2.0, seed=7))
+    turns = np.concatenate(([0.0], np.cumsum(speed_hz[:-1]) * 1e-3))
+    marks = np.arange(1, int(turns[-1] * 40)) / 40
+    phase = Phase(np.interp(marks, turns, time_s) * 1000.0, marks)
+    silence = Record(1000.0, ("b1_y",), "m/s^2", np.zeros((1, time_s.size), dtype=np.float32))
+    speed = ShaftSpeed(10.0, (9.9, 10.1), "tacho", phase)
+    swing = swing_of(View(silence, load_machine("unsw_parallel"), speed))
+    assert swing is not None
+    assert swing.relative == pytest.approx(0.005, rel=0.08)
+    assert swing.bandwidth_hz == pytest.approx(2.0, rel=0.2)
