@@ -47,10 +47,13 @@ def impacts(
     count = int(seconds * RATE_HZ)
     period = 1 / (order * SPEED_HZ)
     times = np.cumsum(period * (1 + jitter * rng.normal(size=int(seconds / period) + 5))) - period
-    at = (times * RATE_HZ).astype(int)
-    at = at[(at >= 0) & (at < count)]
+    at = times * RATE_HZ
+    at = at[(at >= 0) & (at < count - 1)]
+    sizes = size * (1 + 0.1 * rng.normal(size=at.size))
+    first = at.astype(int)
     train = np.zeros(count)
-    train[at] = size * (1 + 0.1 * rng.normal(size=at.size))
+    np.add.at(train, first, sizes * (1 - at + first))  # between samples: shared by both
+    np.add.at(train, first + 1, sizes * (at - first))
     tau = np.arange(int(10 * decay_s * RATE_HZ)) / RATE_HZ
     return np.convolve(train, np.exp(-tau / decay_s) * np.sin(2 * np.pi * RESONANCE_HZ * tau))[:count]
 

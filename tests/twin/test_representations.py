@@ -70,6 +70,30 @@ def test_a_strange_tone_is_found_with_its_frequency_and_taken_out_of_the_noise()
     assert after == pytest.approx(before, abs=0.3)
 
 
+def test_what_a_simulation_without_noise_shows_far_below_the_measured_noise_is_no_place():
+    t = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
+    faint = sum(1e-4 * np.sin(2 * np.pi * (2003.7 + 83 * k) * t) for k in range(20))
+    loud = 0.05 * np.sin(2 * np.pi * 6137.3 * t)
+    clear, strange = (
+        view(record(noise(25) + 0.05 * np.sin(2 * np.pi * 1237.3 * t))),
+        view(record(faint + loud)),
+    )
+    alone = [p.at for p in plan_of(strange).places if p.kind == "tone" and p.domain == "orders"]
+    assert len(alone) == 10
+    both = [p.at for p in plan_of(clear, strange).places if p.kind == "tone" and p.domain == "orders"]
+    assert sorted(both) == pytest.approx([1237.3, 6137.3], abs=0.2)
+
+
+def test_a_tone_beside_the_lines_of_a_bearing_is_still_a_tone():
+    t = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
+    strikes = impacts(26, BPFO, jitter=0.0)
+    hidden = 0.1 * np.sin(2 * np.pi * 3955.2 * t)
+    found = measured(record(0.3 * noise(26) + lines() + strikes + hidden))
+    assert np.isfinite(level(found, kind="ratio", label=BPFO_LABEL)[0])
+    named = [p for p in found.places if p.kind == "tone" and p.domain == "orders" and p.label == "tone"]
+    assert [p.at for p in named if abs(p.at - 3955.2) < 0.3]
+
+
 def test_a_whirl_below_a_turn_is_a_tone_and_a_supply_has_its_name():
     t = np.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
     found = measured(record(noise(4) + lines() + 0.1 * np.sin(2 * np.pi * 4.3 * t), noise(5)))

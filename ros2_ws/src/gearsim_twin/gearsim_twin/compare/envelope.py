@@ -31,6 +31,7 @@ __all__ = ["measure", "places"]
 _BUDGET = 150
 _HARMONICS = 3
 _TONES = 3
+_LEAST_RATIO = 4.0
 _TURNS = 4
 _BIN_VARIANCE = 1.944
 _FEWEST_FLOOR_BINS = 8
@@ -112,13 +113,18 @@ def _turns(frame: Frame) -> list[tuple[float, str]]:
 def _tones(frame: Frame, channel: str, materials: Sequence[Material]) -> list[Place]:
     """The clearest lines that belong to no family, no sideband of one, and no turn of a shaft."""
     seen: list[tuple[float, float, tuple[float, float]]] = []
-    for material in materials:
-        for band in frame.bands_hz:
-            spectra = material.envelope_spectra(channel, band)
-            bins, ratios = peaks_of(spectra)
-            for k, ratio in zip(bins.tolist(), ratios.tolist(), strict=True):
-                order = k * spectra.step
-                if not _is_known(frame, order, 2.5 * spectra.step):
+    for band in frame.bands_hz:
+        spectra = [material.envelope_spectra(channel, band) for material in materials]
+        power = [float(material.envelope(channel, band).values.mean()) for material in materials]
+        for own, mine in zip(spectra, power, strict=True):
+            # What a quiet simulation modulates is diluted by the noise of the loudest record.
+            share = mine / max(*power, 1e-300)
+            bins, _ = peaks_of(own)
+            for k in bins.tolist():
+                order = k * own.step
+                floor = max(float(s.floor[min(round(order / s.step), s.floor.size - 1)]) for s in spectra)
+                ratio = share**2 * float(own.mean[k]) / max(floor, 1e-300)
+                if ratio > _LEAST_RATIO and not _is_known(frame, order, 2.5 * own.step):
                     seen.append((ratio, order, band))
     kept: list[tuple[float, tuple[float, float]]] = []
     for _, order, band in sorted(seen, reverse=True):

@@ -32,6 +32,9 @@ _PEAK_RATIO = 4.0
 _NEARLY = 0.7
 _SPREAD = 0.002
 _LEAST_CAGE = 10.0
+# A second family has a fifth of the modulation of the first, or may be made of differences between the lines
+# of the first and those of the shafts: N turns less BPFO are BPFI.
+_LESS = math.log(5.0)
 _HARMONICS = 4
 _SHAFT_HALF = 1.6
 # Lines nearby pull the phase: at 40 dB by a hundredth of a turn over a way of several windows.
@@ -97,6 +100,7 @@ class _Candidate:
 def _find_all(material: Material, channel: str) -> dict[str, Found]:
     """All families of a channel, the clearest first; the lines of one are no evidence for another."""
     found: dict[str, Found] = {}
+    tallest = -math.inf
     left = list(material.frame.families)
     explained: list[float] = []
     while left:
@@ -104,6 +108,9 @@ def _find_all(material: Material, channel: str) -> dict[str, Found]:
         if best.score <= 0:
             break
         left.remove(best.family)
+        tallest = max(tallest, best.height)
+        if best.height < tallest - _LESS:
+            continue
         result = _refined(material, channel, best.band, best.order)
         off = abs(result.order / best.family.order - 1)
         if not off < best.family.tolerance + material.frame.smear:

@@ -17,7 +17,7 @@ from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.lines import LineLevels, line_levels
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.places import Place
-from gearsim_twin.compare.tones import strongest, tones
+from gearsim_twin.compare.tones import strongest
 
 __all__ = ["measure", "places"]
 
@@ -39,8 +39,8 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
         for line in kept:
             width = (2 * frame.half_bins(line.order) + 1) / frame.window_turns
             found.append(Place("orders", channel, line.kind, line.order, "order", width, line.label))
-        lists = [tones(material, channel, _top(frame), each) for material in materials]
-        for tone in strongest(lists, each, apart):
+        top = _top(frame) if frame.has_orders else 0.0
+        for tone in strongest(materials, channel, top, each, apart):
             width = _BINS / (frame.window_s if tone.unit == "Hz" else frame.window_turns)
             found.append(Place("orders", channel, "tone", tone.at, tone.unit, width, tone.label))
     return found

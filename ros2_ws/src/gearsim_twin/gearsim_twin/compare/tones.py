@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,16 @@ from gearsim_twin.compare.known_orders import nearest_turn
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.windows import WindowSpectra
 
-__all__ = ["Tone", "peaks_of", "tones"]
+__all__ = ["Tone", "peaks_of", "strongest", "tones"]
 
 _FALSE_ALARM = 1e-4
 _FLOOR_WORTH = 14.0  # 64 bins of 1.5 each, a third of them for the trimming
 _SHARP = 4.0  # a line's five bins hold four times what five such as those around them do
 _SHARE = 0.5
+_LEAST_HEIGHT_DB = 6.0  # what the loudest of all bins of averaged noise hardly reaches
 _FAMILY_HARMONICS = 3
 _SHAFT_HARMONICS, _MESH_TURNS = 10, 5
+_NEAR_SHARE = 0.03
 _SUPPLY_HZ = (50.0, 60.0)
 _SUPPLY_MULTIPLES = 20
 
@@ -63,8 +65,8 @@ def peaks_of(spectra: WindowSpectra, least_line: int = 4) -> tuple[NDArray[np.in
     return peaks[sharp], ratio[peaks[sharp]]
 
 
-def tones(material: Material, channel: str, top_order: float, count: int) -> list[Tone]:
-    """The strongest `count` tones of a channel, strongest over the floor first."""
+def tones(material: Material, channel: str, top_order: float) -> list[Tone]:
+    """All tones of a channel."""
     frame = material.frame
     over_time = material.time_spectra(channel)
     found: list[Tone] = []
@@ -83,7 +85,7 @@ def tones(material: Material, channel: str, top_order: float, count: int) -> lis
             found.append(Tone(hz, "Hz", label, 10 * math.log10(ratio)))
     if over_angle is not None:
         found += _in_orders(material, channel, over_angle, over_time)
-    return sorted(found, key=lambda tone: -tone.height_db)[:count]
+    return found
 
 
 def _turn(
@@ -153,7 +155,8 @@ def _name(material: Material, channel: str, hz: float, near_hz: float) -> str | 
     """
     for supply in _SUPPLY_HZ:
         multiple = round(hz / supply)
-        if 1 <= multiple <= _SUPPLY_MULTIPLES and abs(hz - multiple * supply) < max(near_hz, 5e-4 * hz):
+        # A line is placed to a fifth of that distance; a public supply holds its frequency to 0.1 %.
+        if 1 <= multiple <= _SUPPLY_MULTIPLES and abs(hz - multiple * supply) < max(0.2 * near_hz, 1e-3 * hz):
             return f"tone at {multiple} x {supply:g} Hz of a supply"
     frame = material.frame
     turns = {0.0, *(shaft.ratio for shaft in frame.machine.shafts)}
@@ -164,16 +167,39 @@ def _name(material: Material, channel: str, hz: float, near_hz: float) -> str | 
         for shift in turns | {-turn for turn in turns}:
             order = hz / material.speed_hz - shift
             number = max(1, round(order / found.order))
-            if abs(order - number * found.order) * material.speed_hz < near_hz + 2e-3 * hz:
+            # At high harmonics the doubt of the order exceeds their distance: there nothing is told by it.
+            near = min(near_hz / material.speed_hz + 2 * number * found.std, _NEAR_SHARE * found.order)
+            if abs(order - number * found.order) < near:
                 own = shift == 0.0 and number <= _FAMILY_HARMONICS
                 return f"{number} x {family.label}" if own else None
     return "tone"
 
 
-def strongest(lists: Sequence[list[Tone]], count: int, apart: dict[str, float]) -> list[Tone]:
-    """The strongest tones of several records, those that coincide once."""
+def strongest(
+    materials: Sequence[Material], channel: str, top_order: float, count: int, apart: dict[str, float]
+) -> list[Tone]:
+    """The strongest tones of several records, those that coincide once.
+
+    A tone is measured by the loudest noise of all records: what a simulation without noise shows far below
+    that of a measurement can never be compared.
+    """
+    found = []
+    for material in materials:
+        for tone in tones(material, channel, top_order):
+            over = tone.height_db + _floor_db(material, channel, tone, top_order)
+            over -= max(_floor_db(other, channel, tone, top_order) for other in materials)
+            if over >= _LEAST_HEIGHT_DB:
+                found.append(replace(tone, height_db=over))
     kept: list[Tone] = []
-    for tone in sorted((t for tones in lists for t in tones), key=lambda t: -t.height_db):
+    for tone in sorted(found, key=lambda t: -t.height_db):
         if all(o.unit != tone.unit or abs(o.at - tone.at) > apart[tone.unit] for o in kept):
             kept.append(tone)
     return kept[:count]
+
+
+def _floor_db(material: Material, channel: str, tone: Tone, top_order: float) -> float:
+    """Noise per bin at a tone's place."""
+    over_time = tone.unit == "Hz"
+    spectra = material.time_spectra(channel) if over_time else material.order_spectra(channel, top_order)
+    index = min(round(tone.at / spectra.step), spectra.floor.size - 1)
+    return 10 * math.log10(max(float(spectra.floor[index]), 1e-300))
