@@ -16,11 +16,13 @@ from gearsim_io.importers import import_file
 from gearsim_io.machines import load_machine
 from gearsim_sim.scenario import parse_scenario
 from gearsim_twin.causes import CAUSES, Context
+from gearsim_twin.causes.antialias_rolloff import edge_of_band
 from gearsim_twin.causes.clipping import find_limit
 from gearsim_twin.causes.dropouts import find_bursts
 from gearsim_twin.causes.inverter_lines import line_ratio
 from gearsim_twin.causes.lines import SlowPart
 from gearsim_twin.causes.sensor_resonance import mounted_db
+from gearsim_twin.causes.spectra_beside import beside
 from gearsim_twin.causes.unit_or_gain_error import known_factor
 from gearsim_twin.view import view_of
 from tests.twin.chain_cases import RATE_HZ, accelerometers, context, healthy, record
@@ -304,3 +306,15 @@ def test_short_dropouts_are_counted_with_those_too_short_to_see() -> None:
     # Some 1,400 bursts are seen: 2.7 % of their mean length, three times that.
     assert bursts.duration_s == pytest.approx(0.020, rel=0.08)
     assert bursts.rate_hz == pytest.approx(2.0, rel=0.08)
+
+
+@pytest.mark.records
+@pytest.mark.parametrize("file", ["cwru/97_Normal_0.mat", "cwru/135_0.mat"])
+def test_the_edge_that_fools_a_kurtogram_is_a_filter(record_file: Callable[[str], Path], file: str) -> None:
+    """The recorder's filter begins some 20 kHz below a rate of 48 kHz, whatever model stands beside."""
+    seen = _alone(import_file(record_file(file), "cwru_drive_end"), "cwru_drive_end")
+    data = beside(seen.views[0], seen.simulated_views[0], "drive_end")
+    assert data is not None
+    edge = edge_of_band(data, 48000.0)
+    assert edge is not None
+    assert 19e3 < edge.values[0] < 22.5e3

@@ -16,7 +16,7 @@ from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, com
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
 
-__all__ = ["AntialiasRolloff", "lowpass_db"]
+__all__ = ["AntialiasRolloff", "edge_of_band", "lowpass_db"]
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,39 @@ _HIGHEST = 0.45  # of the rate: a corner above it is that of the usual filter
 _LEAST_LOSS_DB = 3.0  # at the upper end
 _STEEP = 3.5  # order between a sensor's second and a converter's filter
 _AGREE = 0.15
+_PER_OCTAVE = 12  # bands of `beside`
+_EDGE_BANDS = 4
+_EDGE_DB = 12.0  # over a third of an octave: steeper than what machines do by themselves
+_EDGE_FROM = 0.36  # of the rate: where such filters begin
 
 
 def lowpass_db(frequency_hz: Array, corner_hz: float, order: float, depth_db: float) -> Array:
     """A Butterworth magnitude of that order down to a floor `depth_db` below."""
     ratio = np.minimum((frequency_hz / corner_hz) ** (2 * order), 1e12)
     return np.asarray(10 * np.log10(1 / (1 + ratio) + 10 ** (-depth_db / 10)))
+
+
+def _end_of_band(data: Beside, sample_rate_hz: float) -> CurveFit | None:
+    """As `_rolloff`; where no curve fits, the edge that the measured spectrum itself shows."""
+    return _rolloff(data, sample_rate_hz) or edge_of_band(data, sample_rate_hz)
+
+
+def edge_of_band(data: Beside, sample_rate_hz: float) -> CurveFit | None:
+    """The last steep fall, if levels stay down behind it and the model has no such fall there."""
+    f, level = data.frequency_hz, data.measured_db
+    for k in range(f.size - _EDGE_BANDS - 1, 4, -1):
+        end = k + _EDGE_BANDS
+        before = float(np.median(level[k - 4 : k + 1]))
+        fall = before - level[end]
+        model = float(np.median(data.simulated_db[k - 4 : k + 1]) - data.simulated_db[end])
+        down = before - level[end:].max()
+        if fall > _EDGE_DB and down > _EDGE_DB and model < 0.5 * fall and f[k] > _EDGE_FROM * sample_rate_hz:
+            over = np.flatnonzero(level[k : end + 1] < before - 3.0)
+            corner = float(f[k + int(over[0])]) / 2 ** (0.5 / _PER_OCTAVE)
+            order = fall / (6.02 * _EDGE_BANDS / _PER_OCTAVE)
+            values = np.array([corner, max(order, _STEEP + 0.5), fall])
+            return CurveFit(values, np.array([0.04 * corner, 0.3 * order, 3.0]), 0.0, fall, 1.0)
+    return None
 
 
 def _rolloff(data: Beside, sample_rate_hz: float) -> CurveFit | None:
@@ -94,7 +121,7 @@ class AntialiasRolloff:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The roll-off that most channels share; else orders that are folded, if any are."""
-        found = by_channel(context, _rolloff)
+        found = by_channel(context, _end_of_band)
         channels = context.views[0].record.channels
         starts: list[dict[str, float | str]] = []
         for group in components(found, len(channels), 0, _AGREE)[:2]:

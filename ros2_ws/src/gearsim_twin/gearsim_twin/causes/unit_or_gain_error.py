@@ -19,6 +19,7 @@ __all__ = ["UnitOrGainError", "known_factor"]
 
 _LEAST_DB = 0.8  # 10 %: within that the sensitivity of a sensor in the field is known
 _SIGMAS = 4.0
+_MOST_SCATTER_DB = 6.0
 _ALIKE_DB = 1.5
 _CORRELATED = 4.0  # neighbouring bands, so that n bands are worth n / 4
 _NAMED_DB = 0.4
@@ -40,11 +41,13 @@ def known_factor(factor: float) -> str:
     return best[1] if best[0] <= _NAMED_DB else ""
 
 
-def _gain(data: Beside, sample_rate_hz: float) -> CurveFit:  # noqa: ARG001
+def _gain(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG001
     """The median ratio of the levels, and its standard deviation by their scatter."""
     ratio = data.ratio_db
     gain = float(np.median(ratio))
     scatter = 1.4826 * float(np.median(np.abs(ratio - gain)))
+    if scatter > _MOST_SCATTER_DB:  # another shape is no factor
+        return None
     std = 1.2533 * max(scatter, 0.3) * (_CORRELATED / ratio.size) ** 0.5
     factor = 10 ** (gain / 20)
     drop = float(np.sum((ratio / data.std_db) ** 2 - ((ratio - gain) / data.std_db) ** 2))
