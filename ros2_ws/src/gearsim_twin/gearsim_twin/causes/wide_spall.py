@@ -25,6 +25,8 @@ _RACES = {"outer_race": "outer", "inner_race": "inner"}
 _EDGE_RADIUS_M = 0.1e-3
 _DEPTH_M = 20e-6
 _GUESSES = (0.35, 0.9)  # of the element's diameter
+# Shorter ones leave an element no time on the floor: they show what a localised spall shows.
+_SHORTEST = 0.25  # of the element's diameter
 _MOST_STARTS = 4
 _REACHED = 0.9  # of the depth that an element reaches: beyond, it would not come down to the floor
 _ROOM = 0.9  # of the race's circumference
@@ -35,7 +37,7 @@ class WideSpall:
 
     name = "wide_spall"
     parameters: tuple[Parameter, ...] = (
-        Parameter("length_m", "m", LogNormal(4e-3, 2.0, 4e-4, 0.1)),
+        Parameter("length_m", "m", LogNormal(4e-3, 2.0, 1e-3, 0.1)),
         Parameter("depth_m", "m", LogNormal(20e-6, 2.5, 1e-6, 5e-4)),
     )
     confused_with: tuple[tuple[str, str], ...] = (
@@ -63,6 +65,8 @@ class WideSpall:
             if number == 0:
                 known = known_width_m(context, record, sign)
                 lengths = [part * diameter for part in _GUESSES] if known is None else [known]
+                if lengths[0] < _SHORTEST * diameter:
+                    continue
             words = {**sign_words(sign, context, record), "race": _RACES[sign.fault]}
             found += [{**words, "length_m": length, "depth_m": _DEPTH_M} for length in lengths]
         return found[: _MOST_STARTS - 1]
