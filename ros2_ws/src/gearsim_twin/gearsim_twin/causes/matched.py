@@ -28,7 +28,7 @@ from gearsim_twin.view import View
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
 
-__all__ = ["Match", "matches"]
+__all__ = ["Match", "matches", "simulated_with"]
 
 _TURNS = 4.2  # of a short simulation
 _LEAST_S = 0.3
@@ -100,7 +100,7 @@ def matches(
     bounds : (low, high)
         Of the size.
     angle : str
-        "tooth", "any" or "none": how the effect may stand on its part; "power" where it leaves no phase.
+        "tooth", "any" or "none": how the effect may stand on its part.
     power : float
         The answer grows with the size to this power.
     signed : bool
@@ -162,9 +162,7 @@ def _match(context: Context, record: int, part: Part, effect: _Effect, size: flo
     without = _lines(context, record, turns, context.contents[record])
     if with_it is None or without is None:
         return None
-    if effect.angle == "power":
-        match = _by_power(own, np.abs(with_it) ** 2 - np.abs(without) ** 2, part)
-    elif has_planets(content) and effect.angle != "none":
+    if has_planets(content) and effect.angle != "none":
         match = _by_power(own, np.abs(with_it - without) ** 2, part)
     else:
         per_turn = part.turns / turns
@@ -257,12 +255,19 @@ def _simulated(
     context: Context, record: int, turns: float, content: Content, seconds: float
 ) -> Complex | None:
     view = context.views[record]
-    with Simulator(context.case, measured=context.views) as simulator:
-        try:
-            (made,) = simulator.views({record: content}, seconds)
-        except InputError:  # an effect of that size cannot be in this machine
-            return None
+    made = simulated_with(context, record, content, seconds)
+    if made is None:
+        return None
     first = min(round(_SETTLING_S * made.record.sample_rate_hz), made.record.sample_count // 4)
     made = made.part(first, made.record.sample_count)
     lines = turn_lines(made, turns, line_count(view, turns), view.record.channels)
     return None if lines is None else lines.values
+
+
+def simulated_with(context: Context, record: int, content: Content, seconds: float) -> View | None:
+    """A short record of a content; None where an effect of that size cannot be in this machine."""
+    with Simulator(context.case, measured=context.views) as simulator:
+        try:
+            return simulator.views({record: content}, seconds)[0]
+        except InputError:
+            return None

@@ -61,7 +61,7 @@ class Misalignment:
         couplings = self._couplings(context)
         # Offset and angle at once tell the shaft; how much of which, each by itself on that shaft.
         both = matches(context, couplings, self._both, _OFFSET_M, _OFFSETS_M, power=_BETWEEN, top=_TOP)
-        shafts = [match.part for match in both[:1]]
+        shafts = [match.part for match in both[:1]] or couplings
         offset = matches(context, shafts, self._offset, _OFFSET_M, _OFFSETS_M, top=_TOP)
         angle = matches(context, shafts, self._angle, _ANGLE_RAD, _ANGLES_RAD, power=_GROWS, top=_TOP)
         lead = matches(context, self._meshes(context)[:1], self._lead, _LEAD_RAD, _LEADS_RAD)

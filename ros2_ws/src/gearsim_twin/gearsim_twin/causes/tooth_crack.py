@@ -17,7 +17,7 @@ _KIND, _SIZE = "gear_tooth_crack", "depth_m"
 __all__ = ["ToothCrack"]
 
 _BOUNDS = (1e-4, 0.02)
-_GROWS = 2.0  # what is lost grows with the depth to about this power
+_GROWS = 1.2  # what is lost grows with the depth to about this power
 _MOST = 3
 
 
