@@ -32,12 +32,12 @@ def handed_over(angle, errors):
     return (1 - share) * errors[tooth] + share * errors[(tooth + 1) % teeth]
 
 
-def trains(seed, *, cracked="", crack=0.0, worn="", worn_by=8.0):
+def trains(seed, *, cracked="", crack=0.0, worn="", worn_by=8.0, gear=GEAR):
     """Encoders of both shafts: run-out, pitch errors of 2e-5 pitches, and what is wrong."""
     rng = np.random.default_rng(seed)
     time = np.arange(-1.0, SECONDS, 1 / RATE_HZ)  # a second to settle
     total = np.zeros(time.size)
-    for shaft, teeth in (("input", PINION), ("output", GEAR)):
+    for shaft, teeth in (("input", PINION), ("output", gear)):
         angle = SPEED_HZ * (PINION / teeth) * time
         errors = 2e-5 * rng.standard_normal(teeth) * (worn_by if shaft == worn else 1.0)
         # Between 0.2 and 0.9 of a pitch on, while the tooth is the only one in contact.
@@ -53,7 +53,7 @@ def trains(seed, *, cracked="", crack=0.0, worn="", worn_by=8.0):
 
     return {
         "input": edges("input", SPEED_HZ, SECONDS, 900, error=lag),
-        "output": edges("output", SPEED_HZ * PINION / GEAR, SECONDS, 900),
+        "output": edges("output", SPEED_HZ * PINION / gear, SECONDS, 900),
     }
 
 
@@ -94,6 +94,13 @@ def test_teeth_far_more_uneven_than_their_mates_are_worn(seed, shaft, component)
     (finding,) = judge_gears(box_of(trains(seed, worn=shaft)))
     assert (finding.component, finding.fault) == (component, "gear_wear")
     assert finding.evidence["uneven_over_mate"] == pytest.approx(8.0, rel=0.5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_whole_multiples_of_teeth_wear_is_not_told(seed):
+    """All that the pinion does lies in the average of a gear of twice as many teeth: both look like its own."""
+    gear = 2 * PINION
+    assert judge_gears(box_of(trains(seed, gear=gear), gearbox(PINION, gear))) == ()
 
 
 def test_a_larger_event_is_the_likelier_spall():

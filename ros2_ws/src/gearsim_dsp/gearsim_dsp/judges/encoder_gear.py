@@ -93,9 +93,11 @@ def worn_wheel_of_mesh(
     """The wheel whose teeth are far more uneven than its mate's; parameters as above.
 
     Both wheels are heard through the same shafts and couplings, which the ratio does not feel. Of wheels of
-    one speed nothing can be said: each average holds both.
+    one speed, or of whole multiples, nothing can be said: the slower one's average holds all that the faster
+    one does.
     """
-    if len(teeth) != 2 or mesh.driving_teeth == mesh.driven_teeth or any(stands_out(one) for one in teeth):
+    small, large = sorted((mesh.driving_teeth, mesh.driven_teeth))
+    if len(teeth) != 2 or large % small == 0 or any(stands_out(one) for one in teeth):
         return None
     worn, mate = sorted(teeth, key=lambda one: -one.event.unevenness)
     over_mate = worn.event.unevenness / max(mate.event.unevenness, 1e-12)
