@@ -191,7 +191,8 @@ def _install_builder(job: Job) -> None:
 def _pip(job: Job, what: Sequence[str], on_line: _Progress | None) -> None:
     command = [str(job.places.python), "-m", "pip", "install", "--no-input", "--progress-bar=off"]
     command += ["--require-hashes", "--no-deps", "--no-compile", "--no-build-isolation"]
-    command += ["--only-binary=:all:", f"--no-binary={SOURCE_ONLY}", *what]
+    # pip before 23.1 runs setup.py itself for what must not be binary, and leaves no RECORD of it.
+    command += ["--only-binary=:all:", f"--no-binary={SOURCE_ONLY}", "--use-pep517", *what]
     # What the system has does not count as installed: the pinned version must be ours.
     command += [] if job.on_wheels else ["--ignore-installed"]
     if job.run(command, "wheels", quiet_environment(), on_line=on_line) == 0:
