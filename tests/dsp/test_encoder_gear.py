@@ -98,7 +98,7 @@ def test_teeth_far_more_uneven_than_their_mates_are_worn(seed, shaft, component)
 
 @pytest.mark.parametrize("seed", range(3))
 def test_of_whole_multiples_of_teeth_wear_is_not_told(seed):
-    """All that the pinion does lies in the average of a gear of twice as many teeth: both look like its own."""
+    """All that the pinion does lies in the average of a gear of twice as many teeth."""
     gear = 2 * PINION
     assert judge_gears(box_of(trains(seed, gear=gear), gearbox(PINION, gear))) == ()
 
