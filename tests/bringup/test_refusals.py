@@ -37,6 +37,7 @@ def files(tmp_path):
     ("command", "words"),
     [
         ("simulate heathy --seconds 1 --out {0}/new", "did you mean healthy?"),
+        ("simulate {0}/none.yaml --seconds 1 --out {0}/new", "none.yaml, expected a file that exists"),
         (
             "simulate {0}/syntax.yaml --seconds 1 --out {0}/new",
             "syntax.yaml: line 2, column 1: got the end of",

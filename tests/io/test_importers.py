@@ -279,7 +279,10 @@ BAD_MAT = [
     ({"b": {"gs": SIGNAL}}, "b.sr: got not in the file"),
     ({"b": {"gs": SIGNAL, "sr": -1.0, "rate": 25.0}}, "b.sr: got -1.0, expected a finite number above 0"),
     ({"b": {"gs": SIGNAL, "sr": "fast", "rate": 25.0}}, "b.sr: got fast, expected a number"),
-    ({"b": {"gs": SIGNAL, "sr": RATE}}, "b.rate: got not in the file"),
+    (
+        {"b": {"gs": SIGNAL, "sr": RATE}},
+        "b.rate: got not in the file, expected a number of that name, or --speed;",
+    ),
     ({"b": {"gs": SIGNAL, "sr": RATE, "rate": 0.0}}, "speed: got 0.0, expected a speed above 0 Hz"),
     ({"b": {"gs": SIGNAL[:0], "sr": RATE, "rate": 25.0}}, "acc: got 0 samples, expected at least two"),
     (
@@ -302,6 +305,13 @@ def test_bad_mat_files_are_named(tmp_path, variables, words):
     assert message.startswith(f"{path}: ")
     assert words in message
     assert "\n" not in message
+
+
+def test_a_file_without_its_load_is_read_all_the_same(tmp_path):
+    section = {**SECTION, "load": {"variable": "b.load", "unit": "N*m"}}
+    path = tmp_path / "run.mat"
+    savemat(path, {"b": {"gs": SIGNAL, "sr": RATE, "rate": 25.0}})
+    assert "load" not in import_file(path, machine(tmp_path, section)).notes
 
 
 TWO = {"rate": {"value": number(1000, "Hz")}, "channels": {"acc": {"column": "x"}, "acc2": {"column": "y"}}}

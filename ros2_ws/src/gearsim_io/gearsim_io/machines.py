@@ -115,6 +115,8 @@ def machine_file(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") and path.is_file():
         return path
+    if path.suffix in (".yaml", ".yml"):
+        raise InputError("machine", "", text, "a file that exists")
     known = ", ".join(machine_names())
     raise InputError("machine", "", text, f"one of {known}, or the path of a .yaml file")
 

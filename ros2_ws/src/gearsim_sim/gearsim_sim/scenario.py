@@ -222,6 +222,8 @@ def scenario_file(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") and path.is_file():
         return path
+    if path.suffix in (".yaml", ".yml"):
+        raise InputError("scenario", "", text, "a file that exists")
     known = ", ".join(scenario_names())
     raise InputError("scenario", "", text, f"one of {known}, or the path of a .yaml file")
 

@@ -114,7 +114,8 @@ def _channels(where: str, content: Content, settings: ImportSettings, wanted: Ov
         stated = content.units.get(variable)
         chosen[name] = (values, source.unit if source.unit is not None else stated or "1")
     if not chosen:
-        raise InputError(where, "channels", content.listing(), "at least one channel")
+        expected = f"one of {', '.join(sources)}, or --column to say which variables are channels"
+        raise InputError(where, "channels", content.listing(), expected)
     lengths = {name: values.size for name, (values, _) in chosen.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} {count}" for name, count in lengths.items())
@@ -218,9 +219,9 @@ def _value(path: Path, content: Content, source: ValueSettings | None, what: str
     if source.variable is not None:
         found = content.value(source.variable)
         if found is None:
-            if source.optional:
+            if source.optional or what == "load":  # without its load a record is worth less, not nothing
                 return None
-            expected = f"a number of that name, or --rate; the file has {content.listing()}"
+            expected = f"a number of that name, or --{what}; the file has {content.listing()}"
             raise InputError(str(path), source.variable, "not in the file", expected)
         try:
             return float(found[1])
