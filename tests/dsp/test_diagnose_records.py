@@ -74,7 +74,7 @@ def test_faulty_records(record_file, name, machine, component, fault):
     diagnosis = diagnose_record(record, plate)
     assert [(f.component, f.fault) for f in diagnosis.findings] == [(component, fault)]
     assert not diagnosis.healthy
-    assert diagnosis.speed.source in ("estimated", "nameplate")
+    assert diagnosis.speed.source == "estimated"
     (finding,) = diagnosis.findings
     assert finding.confidence > 0.7
     family = next(f for f in fault_families(plate) if f.fault == fault)

@@ -172,14 +172,20 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     """
     settings = settings or DiagnosisSettings()
     plate = machine_for(record, machine)
-    known = {channel.name for channel in plate.channels}
-    if known and not known & set(record.channels):
-        expected = "a channel of the machine: " + ", ".join(sorted(known))
+    listed = {channel.name for channel in plate.channels}
+    if listed and not listed & set(record.channels):
+        expected = "a channel of the machine: " + ", ".join(sorted(listed))
         raise InputError(record.source or "record", "channels", ", ".join(record.channels), expected)
     window = _window(record, plate, settings)
     angle = record_speed(record, plate)
-    pool, reports, impulsive = _by_windows(record, plate, angle, window, settings.batch_samples)
+    known = KnownSpeeds(angle.speed, record.first_sample) if angle.speed is not None else None
+    speeds = known if known is not None and angle.replaces_angle else LiveSpeeds(plate, follow=False)
+    pool, reports, impulsive = _by_windows(record, plate, speeds, window, settings.batch_samples)
     verdict = find_faults(plate, pool)
+    if verdict.speed.source == "nameplate" and known is not None and speeds is not known:
+        # Single windows do not tell the speed, but the whole record does.
+        pool, reports, impulsive = _by_windows(record, plate, known, window, settings.batch_samples)
+        verdict = find_faults(plate, pool)
     notes = _quality(record, plate, verdict, reports)
     speed = angle.speed or verdict.speed
     # A wrong angle signal is not to be read again.
@@ -211,12 +217,9 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
 
 
 def _by_windows(
-    record: Record, plate: Machine, angle: RecordSpeed, window: WindowSettings, batch_samples: int
+    record: Record, plate: Machine, speeds: WindowSpeeds, window: WindowSettings, batch_samples: int
 ) -> tuple[EvidencePool, list[Report], list[Report]]:
     """Evidence of all windows together, and the reports of the envelope and the kurtosis monitor on each."""
-    speeds: WindowSpeeds = LiveSpeeds(plate, follow=False)
-    if angle.replaces_angle and angle.speed is not None:
-        speeds = KnownSpeeds(angle.speed, record.first_sample)
     settings = EnvelopeSettings(window, size_every=0, between=True)
     envelope = EnvelopeMonitor(plate, settings, speeds=speeds, by_window=False)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
