@@ -43,6 +43,9 @@ def test_order_one_in_both_directions_is_unbalance():
     _, (finding,) = judge({"in_y": line(1, 3.0), "in_x": line(1, 2.5, 1.9)})
     assert (finding.component, finding.fault) == ("input", "unbalance")
     assert finding.evidence["velocity_mm_s"] == pytest.approx(2.5, rel=0.02)
+    # White noise of 0.05 m/s^2 gives a line of a record of N samples the amplitude 2 x 0.05 / sqrt(N).
+    noise_mm_s = 1e3 * 2 * 0.05 / np.sqrt(2 * turns(SPEED_HZ, SECONDS).size) / (2 * np.pi * SPEED_HZ)
+    assert finding.snr_db == pytest.approx(20 * np.log10(2.5 / noise_mm_s), abs=1.5)
 
 
 def test_order_one_along_one_direction_is_not():

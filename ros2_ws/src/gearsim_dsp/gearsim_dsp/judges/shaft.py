@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,8 @@ class BearingLevels:
         Order 1 in the direction in which it is weakest, also where it is little above the noise.
     unseen_mm_s : float
         Order 1 that noise may hide.
+    noise_mm_s : ndarray, shape (16,)
+        RMS that noise alone gives these orders in that channel.
     """
 
     bearing: Bearing
@@ -94,6 +96,7 @@ class BearingLevels:
     across_mm_s: float
     faint_mm_s: float
     unseen_mm_s: float
+    noise_mm_s: Array
 
     @property
     def first(self) -> float:
@@ -135,7 +138,16 @@ def judge_shafts(measured: Measured) -> tuple[Finding, ...]:
 
 def _worst(findings: tuple[Finding, ...]) -> float:
     """In decibels over the limits; minus infinity where nothing was found."""
-    return max((one.snr_db for one in findings), default=-math.inf)
+    return max((_over_limit_db(one) for one in findings), default=-math.inf)
+
+
+def _over_limit_db(finding: Finding) -> float:
+    value, limit = finding.evidence["velocity_mm_s"], finding.evidence["limit_mm_s"]
+    return _decibels(cast(float, value), cast(float, limit))
+
+
+def _decibels(value: float, reference: float) -> float:
+    return 20 * math.log10(value / max(reference, 1e-9))
 
 
 def _judged(measured: Measured) -> tuple[Finding, ...]:
@@ -227,6 +239,7 @@ def bearing_levels(measured: Measured) -> dict[str, list[BearingLevels]]:
                 across,
                 min(faint),
                 min(_MAYBE * float(least[1]) for _, least in both.values()),
+                both[loudest][1] / _SURE,
             )
         )
     return found
@@ -305,6 +318,8 @@ def _finding(
 ) -> Finding:
     ratio = measured.machine.shaft(levels.bearing.shaft).ratio
     limit = _UNBALANCE_MM_S if fault == "unbalance" else _HARMONICS_MM_S
+    counted = levels.noise_mm_s[1:2] if fault == "unbalance" else levels.noise_mm_s
+    noise = float(np.sqrt(np.sum(counted**2)))
     severity = (
         "severe" if velocity >= _SEVERE_MM_S else "moderate" if velocity >= _MODERATE_MM_S else "slight"
     )
@@ -326,7 +341,7 @@ def _finding(
         ratio,
         ratio,
         ratio * measured.speed.value_hz,
-        20 * math.log10(velocity / limit),
+        _decibels(velocity, noise),
         confidence(fault, features),
         severity,
         levels.channel,
