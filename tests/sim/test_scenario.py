@@ -206,7 +206,7 @@ def test_a_trace_may_give_the_load(tmp_path, point, load_nm):
 def test_unknown_names_and_files(tmp_path):
     with pytest.raises(InputError, match="scenario: got nope, expected one of added_structure, "):
         load_scenario("nope")
-    with pytest.raises(InputError, match="none.yaml, expected a file that exists"):
+    with pytest.raises(InputError, match=r"none\.yaml, expected a file that exists"):
         load_scenario(tmp_path / "none.yaml")
 
 
