@@ -11,7 +11,7 @@ from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_section, with_sensor
 from gearsim_twin.causes.folded import folded_orders
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, components, fit_curve, pooled
+from gearsim_twin.causes.spectra_beside import Beside, CurveFit, agreeing, channels_of, fit_curve, pooled
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -121,11 +121,8 @@ class AntialiasRolloff:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The roll-off that most channels share; else orders that are folded, if any are."""
-        found = by_channel(context, _end_of_band)
-        channels = context.views[0].record.channels
         starts: list[dict[str, float | str]] = []
-        for group in components(found, len(channels), 0, _AGREE)[:2]:
-            fits = [found[name] for name in group]
+        for component, fits in agreeing(context, _end_of_band, _AGREE)[:2]:
             (corner, std), (order, _) = pooled(fits, 0), pooled(fits, 1)
             starts.append(
                 {
@@ -133,7 +130,7 @@ class AntialiasRolloff:
                     "std:corner_hz": std,
                     "kind": "converter" if order > _STEEP else "bandwidth",
                     "order": order,
-                    "component": "all" if len(group) == len(channels) else ",".join(group),
+                    "component": component,
                 }
             )
         if folded := folded_orders(context.views):
@@ -160,7 +157,7 @@ class AntialiasRolloff:
             }
             return with_section(content, "sensors.accelerometers.sampling", sampling)
         component = str(values["component"])
-        names = context.views[0].record.channels if component == "all" else component.split(",")
+        names = channels_of(component, context)
         for channel in names:
             content = with_sensor(content, channel, "bandwidth", f"{min(corner, 0.489 * rate):.9g} Hz")
         return content

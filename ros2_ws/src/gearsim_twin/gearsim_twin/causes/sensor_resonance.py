@@ -13,8 +13,8 @@ from gearsim_twin.causes.prior import LogNormal
 from gearsim_twin.causes.spectra_beside import (
     Beside,
     CurveFit,
-    by_channel,
-    components,
+    agreeing,
+    channels_of,
     fit_curve,
     peaks_hz,
     pooled,
@@ -87,11 +87,8 @@ class SensorResonance:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The resonance that most channels share, and that of the clearest others."""
-        found = by_channel(context, _resonance)
-        channels = context.views[0].record.channels
         starts: list[dict[str, float | str]] = []
-        for group in components(found, len(channels), 0, _AGREE)[:3]:
-            fits = [found[name] for name in group]
+        for component, fits in agreeing(context, _resonance, _AGREE)[:3]:
             (resonance, std), (q, q_std) = pooled(fits, 0), pooled(fits, 1)
             starts.append(
                 {
@@ -99,7 +96,7 @@ class SensorResonance:
                     "std:resonance_hz": std,
                     "q": q,
                     "std:q": q_std,
-                    "component": "all" if len(group) == len(channels) else ",".join(group),
+                    "component": component,
                 }
             )
         return starts
@@ -107,7 +104,7 @@ class SensorResonance:
     def extend(self, content: Content, values: Values, context: Context) -> Content:
         """The content with that mounting."""
         component = str(values["component"])
-        names = context.views[0].record.channels if component == "all" else component.split(",")
+        names = channels_of(component, context)
         mounting = {"resonance": f"{float(values['resonance_hz']):.9g} Hz", "q": float(values["q"])}
         for channel in names:
             content = with_sensor(content, channel, "mounting", mounting)

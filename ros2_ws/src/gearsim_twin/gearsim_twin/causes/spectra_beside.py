@@ -254,28 +254,36 @@ def by_channel(
     return found
 
 
-def components(found: dict[str, CurveFit], channels: int, column: int, within: float) -> list[list[str]]:
-    """Channels that agree, the clearest group first.
+def agreeing(
+    context: Context, find: Callable[[Beside, float], CurveFit | None], within: float
+) -> list[tuple[str, list[CurveFit]]]:
+    """Fits of channels that agree, the clearest group first, each with its channels as a `component`.
 
     Parameters
     ----------
-    found : dict
-        By channel.
-    channels : int
-        Of the records.
-    column : int
-        The parameter that must agree.
+    context : Context
+    find : callable
+        As `by_channel` takes it.
     within : float
-        Relative distance up to which it does.
+        Relative distance up to which the first parameters of two fits agree.
     """
+    found = by_channel(context, find)
     left = sorted(found, key=lambda name: -found[name].drop)
     groups = []
     while left:
-        first = found[left[0]].values[column]
-        group = [name for name in left if abs(found[name].values[column] / first - 1) <= within]
+        first = found[left[0]].values[0]
+        group = [name for name in left if abs(found[name].values[0] / first - 1) <= within]
         groups.append(group)
         left = [name for name in left if name not in group]
-    return sorted(groups, key=lambda group: -sum(found[name].drop for name in group))[:channels]
+    groups.sort(key=lambda group: -sum(found[name].drop for name in group))
+    everyone = len(context.views[0].record.channels)
+    words = ["all" if len(group) == everyone else ",".join(group) for group in groups]
+    return [(word, [found[name] for name in group]) for word, group in zip(words, groups, strict=True)]
+
+
+def channels_of(component: str, context: Context) -> Sequence[str]:
+    """The channels that a `component` of `agreeing` stands for."""
+    return context.views[0].record.channels if component == "all" else component.split(",")
 
 
 def pooled(fits: Sequence[CurveFit], column: int) -> tuple[float, float]:
