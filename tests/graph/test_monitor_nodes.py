@@ -47,6 +47,16 @@ def plain(message):
     return from_msg(message, Alarm)
 
 
+def test_a_node_that_must_be_heard_takes_no_samples_before(rig):
+    """Else an alarm may come before the middleware has connected its listener, and is lost."""
+    rig.domain.start_node(ENVELOPE, {"alarm_listeners": 1})
+    rig.hear(qos.DIAGNOSTICS)
+    rig.until(lambda: rig.status("envelope: machine")[0] is not None)
+    assert not rig.domain.spin(rig.node, lambda: rig.node.count_subscribers("/gearsim/accel"), 2.0)
+    rig.hear(qos.ALARM)
+    assert rig.domain.spin(rig.node, lambda: rig.node.count_subscribers("/gearsim/accel"), 10.0)
+
+
 def test_a_fault_is_told_by_both_nodes_exactly_as_offline(rig):
     from gearsim_dsp.alarms import AlarmSettings
     from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor

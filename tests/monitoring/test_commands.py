@@ -34,6 +34,9 @@ def test_what_runs_follows_from_the_options(tmp_path):
     assert nodes["mqtt"].parameters == {"host": "broker.local", "port": 1883}
     assert nodes["envelope"].parameters == {"latch": "error"}
     assert nodes["gear"].parameters == {"latch": "error", "baseline_dir": str(tmp_path), "learn_s": 30.0}
+    # recorder and command line, exporter and MQTT, and the two learning nodes hear every alarm from the first
+    waiting = {spec.name: spec.parameters.get("alarm_listeners") for spec in every.specs(alarm_listeners=2)}
+    assert waiting == {"exporter": None, "mqtt": None, "trend": None, "envelope": 6, "kurtosis": 6, "gear": 6}
 
 
 @pytest.mark.parametrize(

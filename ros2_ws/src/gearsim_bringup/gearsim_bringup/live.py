@@ -23,6 +23,7 @@ _READY_S = 60.0
 # are lost and the next come after 3 s: so the run keeps looking.
 _DISCOVERY_S = 1.0
 _PATIENCE_S = 60.0
+_WATCHERS = 1  # this process hears the alarms itself
 
 
 @dataclass
@@ -64,7 +65,7 @@ class LiveRun:
             specs.append(NodeSpec("recorder", "gearsim_io.nodes.recorder", values))
         if self.rrd is not None:
             specs.append(NodeSpec("viewer", "gearsim_io.nodes.viewer", {"out": str(self.rrd)}))
-        return [*specs, *self.choice.specs()]
+        return [*specs, *self.choice.specs(alarm_listeners=len(specs) + _WATCHERS)]
 
     def run(self, on_start: Callable[[Graph], None] | None = None) -> Outcome:
         """Run until the source ends by itself, or Ctrl-C. `on_start` is told when all processes are up.

@@ -39,18 +39,30 @@ class Choice:
         """Nodes that subscribe to the samples."""
         return sum(name not in _OF_RESULTS for name in self.monitors)
 
-    def specs(self) -> list[NodeSpec]:
-        """The nodes, those that listen to results before those that have them."""
+    @property
+    def alarm_listeners(self) -> int:
+        """Nodes that subscribe to the alarms."""
+        stacks = sum(address is not None for address in (self.prometheus, self.mqtt))
+        return stacks + sum(name in _LEARNING for name in self.monitors)
+
+    def specs(self, alarm_listeners: int = 0) -> list[NodeSpec]:
+        """The nodes, those that listen to results before those that have them.
+
+        `alarm_listeners` others, beside these nodes, must be there to hear alarms before samples are taken.
+        """
+        everyone = alarm_listeners + self.alarm_listeners if alarm_listeners else 0
         found = []
         for name, address in (("exporter", self.prometheus), ("mqtt", self.mqtt)):
             if address is not None:
                 values: dict[str, str | int] = {"host": address[0], "port": address[1]}
                 found.append(NodeSpec(name, f"gearsim_bringup.monitoring.nodes.{name}", values))
         order = sorted(self.monitors, key=lambda name: name not in _OF_RESULTS)
-        return found + [NodeSpec(n, f"gearsim_dsp.nodes.{n}", self._parameters(n)) for n in order]
+        return found + [NodeSpec(n, f"gearsim_dsp.nodes.{n}", self._parameters(n, everyone)) for n in order]
 
-    def _parameters(self, name: str) -> dict[str, str | float]:
+    def _parameters(self, name: str, alarm_listeners: int) -> dict[str, str | float]:
         parameters: dict[str, str | float] = {"latch": self.latch}
+        if alarm_listeners and name not in _OF_RESULTS:
+            parameters["alarm_listeners"] = alarm_listeners
         if name in _LEARNING and self.baselines:
             parameters["baseline_dir"] = self.baselines
         if name in _LEARNING and self.learn_s:

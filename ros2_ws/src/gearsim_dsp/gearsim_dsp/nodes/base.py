@@ -74,8 +74,8 @@ class MonitorNode(Node):
         self._features, self._spectrum, self._alarm, self._alarm_state = made
         self._inputs = [qos.MACHINE_INFO]
         qos.create_subscription(self, qos.MACHINE_INFO, self._on_machine)
-        for topic in inputs:
-            self._listen(topic)
+        self._inputs_to_come = inputs
+        self._listen_when_heard()
         self._alarm_services = AlarmServices(self, self._change)
         self._news = self.create_guard_condition(self._report_alarms)
         self._worker = threading.Thread(target=self._work, name=f"{source} analysis", daemon=True)
@@ -87,6 +87,17 @@ class MonitorNode(Node):
         self._queue.close()
         if self._worker.is_alive():
             self._worker.join(DRAIN_S + 2.0)
+
+    def _listen_when_heard(self) -> None:
+        """Take inputs once as many as were asked for would hear an alarm.
+
+        A source that waits for this node's subscription then waits for those as well, and no first alarm is
+        lost to a connection that the middleware has not made yet.
+        """
+        if self._alarm.get_subscription_count() >= self._given.alarm_listeners:
+            topics, self._inputs_to_come = self._inputs_to_come, ()
+            for topic in topics:
+                self._listen(topic)
 
     def _listen(self, topic: qos.Topic) -> None:
         self._inputs.append(topic)
@@ -104,7 +115,8 @@ class MonitorNode(Node):
             return
         self._machine, self._machine_error = machine, ""
         self._health.health.hardware_id = machine.name
-        angle = qos.TACHO in self._inputs and qos.ENCODER not in self._inputs
+        inputs = (*self._inputs, *self._inputs_to_come)
+        angle = qos.TACHO in inputs and qos.ENCODER not in inputs
         if angle and not machine.tacho_shafts and machine.encoder_shafts:
             self._listen(qos.ENCODER)
         self._next_monitor = monitor
@@ -188,6 +200,8 @@ class MonitorNode(Node):
     def _tick(self) -> None:
         if self._failure is not None:
             raise RuntimeError("the analysis stopped") from self._failure
+        if self._inputs_to_come:
+            self._listen_when_heard()
         self._check_types()
         monitor = self._monitor
         status = StreamStatus.of(monitor.assembler, self._queue) if monitor else StreamStatus()

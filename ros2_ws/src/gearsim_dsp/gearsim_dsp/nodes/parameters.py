@@ -30,6 +30,7 @@ class AlarmParameters:
     )
     stale_after_s: float = parameter(3.0, "silence after which the stream is stale [s]", 0.1, 3600.0)
     patience_s: float = parameter(3.0, "wait for machine_info before complaining [s]", 0.0, 3600.0)
+    alarm_listeners: int = parameter(0, "subscribers of alarm to wait for before taking samples", 0, 100)
     queue_s: float = parameter(10.0, "signal that may wait for analysis [s]", 0.5, 120.0)
 
     def check(self) -> None:
