@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsim_bringup.diagnosis_report.folder import check_folder, placed
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.page import PLOTLY, make_page, script_safe
-from gearsim_bringup.diagnosis_report.plot import axis, extremes, packed, strongest
+from gearsim_bringup.diagnosis_report.page import make_page
 from gearsim_bringup.diagnosis_report.trend import fault_level
 from gearsim_bringup.diagnosis_report.write import PAGE, VERDICT, write_report
+from gearsim_bringup.pages.assembled import PLOTLY, script_safe
+from gearsim_bringup.pages.folder import check_folder, placed
+from gearsim_bringup.pages.plot import axis, extremes, packed, strongest
 from gearsim_dsp.diagnose import Diagnosis, diagnose_record
 from gearsim_io.errors import InputError
 from gearsim_io.importers import import_file
@@ -158,7 +159,7 @@ def test_all_channels_are_drawn_with_their_peaks(report, simulated):
 
 def test_the_page_is_of_bounded_size(report):
     largest = 1_000_000  # of all plots together, eight channels included; plotly.js is 1.5 MB on top
-    bundle = resources.files("gearsim_bringup.diagnosis_report").joinpath("files", PLOTLY).read_text()
+    bundle = resources.files("gearsim_bringup.pages").joinpath("files", PLOTLY).read_text()
     assert len(report.page) - len(bundle) < largest
 
 
@@ -229,7 +230,7 @@ def test_numbers_and_labels_cannot_break_out():
 
 
 def test_the_bundle_is_the_one_released():
-    files = resources.files("gearsim_bringup.diagnosis_report").joinpath("files")
+    files = resources.files("gearsim_bringup.pages").joinpath("files")
     told = hashlib.sha256(files.joinpath(PLOTLY).read_bytes()).hexdigest()
     assert told == "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"
     assert "MIT" in files.joinpath("plotly-LICENSE.txt").read_text()

@@ -21,7 +21,15 @@ setup(
     maintainer_email=ABOUT.find("maintainer").get("email"),
     python_requires=">=3.11",
     packages=find_packages(),
-    package_data={NAME: ["bench/peers/*.txt", "monitoring/files/*.*", "diagnosis_report/files/*.*"]},
+    package_data={
+        NAME: [
+            "bench/peers/*.txt",
+            "monitoring/files/*.*",
+            "diagnosis_report/files/*.*",
+            "pages/files/*.*",
+            "twin_report/files/*.*",
+        ]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -7,7 +7,7 @@ first, if there are any) -> causes chosen one by one -> scores on held-out recor
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from gearsim_twin.causes.context import Context
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan, features, make_plan
 from gearsim_twin.conclude import Evidence, concluded
+from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
 from gearsim_twin.fit import fit_tuning
 from gearsim_twin.measuring_chain import measuring_chain
@@ -130,6 +131,7 @@ def judge(
     out: Path | None = None,
     tell: Tell = lambda _: None,
     causes: Sequence[Cause] | None = None,
+    show: bool = False,
 ) -> Verdict:
     """What is wrong, why, the extended model, and the gain.
 
@@ -143,6 +145,8 @@ def judge(
         Gets a line on what is being done; it may raise to stop.
     causes : sequence of Cause, optional
         In place of all that are known.
+    show : bool
+        Whether the verdict gets what a page shows beside it (`Verdict.exhibit`).
 
     Raises
     ------
@@ -155,11 +159,11 @@ def judge(
     with Simulator(case, chosen.workers) as simulator:
         tell("simulating the nominal model")
         bench = Bench.of(case, simulator, chosen)
-        return _judged(bench, chosen, known, out, tell)
+        return _judged(bench, chosen, known, out, tell, show)
 
 
 def _judged(
-    bench: Bench, settings: Settings, causes: tuple[Cause, ...], out: Path | None, tell: Tell
+    bench: Bench, settings: Settings, causes: tuple[Cause, ...], out: Path | None, tell: Tell, show: bool
 ) -> Verdict:
     case = bench.case
     train, held, healthy = len(case.training), len(case.holdout), len(case.healthy)
@@ -186,6 +190,9 @@ def _judged(
     remarks = dict.fromkeys([*case.remarks, *(each for view in bench.views for each in view.remarks)])
     evidence = Evidence(work, selection, prior, scores, tuple(remarks))
     verdict = concluded(evidence)
+    if show:
+        tell("gathering what is shown")
+        verdict = replace(verdict, exhibit=exhibit_of(bench, work, selection, settings.seed))
     if out is None:
         return verdict
     content = selection.final.trial.model.content(work.nominal[0])

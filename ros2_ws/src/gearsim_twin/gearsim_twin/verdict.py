@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gearsim_twin.compare.merged import Discrepancy
+from gearsim_twin.exhibit import Exhibit
 from gearsim_twin.score import METRIC, Interval, Scores
 from gearsim_twin.select import Selection
 
@@ -91,6 +92,8 @@ class Verdict:
     selection : Selection
         How it was found, for reports.
     remarks : tuple of str
+    exhibit : Exhibit or None
+        What a page shows beside all this; only where it was asked for.
     """
 
     word: Word
@@ -103,6 +106,7 @@ class Verdict:
     extended_model: Path | None
     selection: Selection
     remarks: tuple[str, ...] = ()
+    exhibit: Exhibit | None = None
 
     def to_json(self) -> dict[str, Any]:
         """As `twin --json` prints it."""

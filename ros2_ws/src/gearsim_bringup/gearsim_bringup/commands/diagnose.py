@@ -38,7 +38,7 @@ def command(
     json_mode: bool,
 ) -> None:
     """Diagnose a bag or a measured file with the code of the diagnostic nodes."""
-    from gearsim_bringup.diagnosis_report.folder import check_folder
+    from gearsim_bringup.pages.folder import check_folder
     from gearsim_bringup.sources import open_source
     from gearsim_io.importers import Overrides
 

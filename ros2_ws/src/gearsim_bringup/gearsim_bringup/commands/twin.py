@@ -68,7 +68,7 @@ def command(
 
     Without --report the extended model goes to a new folder out/twin_N.
     """
-    from gearsim_bringup.diagnosis_report.folder import check_folder
+    from gearsim_bringup.pages.folder import check_folder
     from gearsim_bringup.twin_run import lines, new_folder, run_judge
     from gearsim_io.importers import Overrides
     from gearsim_twin.given import HEALTHY, HELD_OUT, MEASURED, check_given

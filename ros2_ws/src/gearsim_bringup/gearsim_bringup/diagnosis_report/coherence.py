@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gearsim_bringup.diagnosis_report.lines import drawn, expected_marks, finding_marks
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, curve, packed, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
+from gearsim_bringup.pages.plot import BLUE, Plot, axis, curve, packed, strongest
 from gearsim_dsp.band_choice import usable_ceiling_hz
 from gearsim_dsp.cyclic.averaging import averaged_coherence
 

@@ -16,8 +16,8 @@ from gearsim_bringup.diagnosis_report.lines import (
     shaft_marks,
 )
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, Plot, axis, curve, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
+from gearsim_bringup.pages.plot import BLUE, FOUND, GREY, Plot, axis, curve, strongest
 from gearsim_dsp.band_choice import choose_band
 from gearsim_dsp.cyclic.envelope_spectra import squared_envelope_spectrum
 from gearsim_dsp.cyclic.modulation import ModulationSpectrum

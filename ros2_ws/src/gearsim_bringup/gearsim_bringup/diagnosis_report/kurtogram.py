@@ -8,7 +8,7 @@ import numpy as np
 from scipy import fft as sfft
 
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import FOUND, Plot, axis, packed
+from gearsim_bringup.pages.plot import FOUND, Plot, axis, packed
 from gearsim_dsp.band_choice import usable_ceiling_hz
 from gearsim_dsp.envelope import suppress_lines, window_spectrum
 from gearsim_dsp.kurtogram import KurtogramNode, fast_kurtogram, largest_level

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gearsim_bringup.diagnosis_report.material import BEARING_FAULTS, Material
-from gearsim_bringup.diagnosis_report.plot import FOUND, GREEN, GREY, ORANGE, comb
 from gearsim_bringup.diagnosis_report.words import fault_name, shaft_words
+from gearsim_bringup.pages.plot import FOUND, GREEN, GREY, ORANGE, comb
 from gearsim_dsp.judges.finding import Finding
 
 __all__ = [

@@ -9,8 +9,8 @@ from scipy import fft as sfft
 
 from gearsim_bringup.diagnosis_report.lines import all_marks, drawn
 from gearsim_bringup.diagnosis_report.material import LONGEST_S, Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, Plot, axis, curve, strongest
 from gearsim_bringup.diagnosis_report.words import shaft_words
+from gearsim_bringup.pages.plot import BLUE, Plot, axis, curve, strongest
 from gearsim_dsp.angle.resample import to_angle
 from gearsim_io.errors import InputError
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsim_bringup.diagnosis_report.lines import all_marks, drawn
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, Plot, axis, curve, strongest
+from gearsim_bringup.pages.plot import BLUE, FOUND, Plot, axis, curve, strongest
 from gearsim_dsp.spectra import welch_psd
 
 __all__ = ["draw_low_spectrum", "draw_spectrum"]

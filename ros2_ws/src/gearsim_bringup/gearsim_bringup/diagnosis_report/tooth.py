@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import fft as sfft
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, GREY, SERIES, Plot, axis, curve, extremes
 from gearsim_bringup.diagnosis_report.words import shaft_words
+from gearsim_bringup.pages.plot import BLUE, FOUND, GREY, SERIES, Plot, axis, curve, extremes
 from gearsim_dsp.angle.encoder import encoder_phase, transmission_error
 from gearsim_dsp.angle.resample import full_rate
 from gearsim_dsp.gear_kinematics import GearWheel, gear_wheels

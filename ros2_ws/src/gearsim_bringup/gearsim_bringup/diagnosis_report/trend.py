@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import BLUE, FOUND, SERIES, Plot, axis, text
 from gearsim_bringup.diagnosis_report.words import fault_name
+from gearsim_bringup.pages.plot import BLUE, FOUND, SERIES, Plot, axis, text
 from gearsim_dsp.envelope import squared_envelopes, suppress_lines, window_spectrum
 from gearsim_dsp.features import crest_factor, kurtosis, rms
 from gearsim_dsp.judges.finding import Finding

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_bringup.diagnosis_report.material import Material
-from gearsim_bringup.diagnosis_report.plot import (
+from gearsim_bringup.pages.plot import (
     BLUE,
     FOUND,
     GREY,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from gearsim_bringup.diagnosis_report.folder import check_folder, placed
 from gearsim_bringup.diagnosis_report.material import Material
 from gearsim_bringup.diagnosis_report.page import make_page
+from gearsim_bringup.pages.folder import check_folder, placed
 from gearsim_bringup.ui import plain
 from gearsim_dsp.diagnose import Diagnosis
 from gearsim_io.nameplate import Machine

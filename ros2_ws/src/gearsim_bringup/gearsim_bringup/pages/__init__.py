@@ -1,0 +1,1 @@
+"""What all pages share: style, plots as plotly.js takes them, a template filled in, a folder made whole."""
