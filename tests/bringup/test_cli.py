@@ -11,6 +11,7 @@ import pytest
 
 from gearsim_bringup import cli
 from gearsim_bringup.ui import JobFailedError, plain
+from gearsim_io.bags import BagError
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_sim.scenario import scenario_names
 
@@ -33,6 +34,7 @@ def gearsim(*words: str, cwd=None) -> subprocess.CompletedProcess[str]:
         (EnvironmentLackError("no compiler", "apt-get install g++"), 3, "apt-get install g++"),
         (JobFailedError("the simulator ended early"), 1, "the simulator ended early"),
         (OSError(28, "No space left on device"), 1, "No space left on device"),
+        (BagError("x.png: the viewer drew nothing"), 1, "gearsim: x.png: the viewer drew nothing"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (click.UsageError("no such option"), 2, "no such option"),
         (RuntimeError("surprise"), 1, "unexpected RuntimeError: surprise"),
@@ -50,6 +52,7 @@ def test_every_kind_of_error_is_one_line_with_its_code(error, code, words, monke
     assert words in printed.err
     assert len(printed.err.strip().splitlines()) == 1
     assert "Traceback" not in printed.err
+    assert ("crash.txt" in printed.err) == (words == "unexpected RuntimeError: surprise")
 
 
 def test_unforeseen_error_leaves_its_traceback_in_a_file(monkeypatch, tmp_path):

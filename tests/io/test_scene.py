@@ -16,7 +16,8 @@ from gearsim_io.bags import BagError, BagWriter, StreamWriter
 from gearsim_io.errors import EnvironmentLackError, InputError
 from gearsim_io.health import Level
 from gearsim_io.machines import load_machine
-from gearsim_io.scene import look_through
+from gearsim_io.messages import pure_types, to_msg
+from gearsim_io.scene import Scene, look_through
 from gearsim_io.scene.waves import Outliner, cut
 
 SECOND = 1_000_000_000
@@ -126,6 +127,7 @@ def test_a_full_disk_is_told(bag, tmp_path):
     try:
         with pytest.raises(BagError, match=r"out\.rrd: not written to the end"):
             rerun_export.export(bag, place / "out.rrd", full=True)
+        assert list(place.iterdir()) == []
     finally:
         subprocess.run(["umount", str(place)], check=True)
 
@@ -140,6 +142,34 @@ def test_a_full_disk_is_told(bag, tmp_path):
 def test_names_are_checked(bag, tmp_path, make, name, words):
     with pytest.raises(InputError, match=words):
         make(bag, tmp_path / name)
+
+
+def test_what_interrupts_leaves_no_half_recording_and_progress_is_told(bag, tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(rerun_export, "_TELL_EVERY", 8)
+
+    def stop_late(share):
+        told.append(share)
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rerun_export.export(bag, tmp_path / "out.rrd", progress=stop_late)
+    assert list(tmp_path.iterdir()) == []
+    assert told[0] == 0.0
+    assert told == sorted(told)
+
+
+def test_a_viewer_that_never_ends_is_left_and_told(tmp_path, monkeypatch):
+    viewer = tmp_path / "viewer"
+    viewer.write_text("#!/bin/sh\n[ $1 = analytics ] || exec sleep 60\n")
+    viewer.chmod(0o755)
+    small = tmp_path / "small.rrd"
+    small.write_bytes(b"x" * 10_000)
+    monkeypatch.setattr(rerun_export, "viewer_path", lambda: viewer)
+    monkeypatch.setattr(rerun_export, "_DRAWS_S", 0.7)
+    with pytest.raises(BagError, match=r"drew nothing within 1 s; .*view BAG --out out\.rrd"):
+        rerun_export.screenshot(small, tmp_path / "out.png")
 
 
 def test_a_bag_without_samples_is_told(tmp_path):
@@ -254,3 +284,39 @@ def test_the_viewer_is_bound_to_this_computer_and_sends_nothing(bag, tmp_path, m
     assert draw[draw.index("--bind") + 1] == "127.0.0.1"
     assert options["env"]["HOME"] != "", "settings of its own"
     assert "gearsim-rerun-" in options["env"]["HOME"]
+
+
+class Paper:
+    """A canvas that only notes the values of lines."""
+
+    def __init__(self):
+        self.values = {}
+
+    def line(self, *_):
+        pass
+
+    def lines_below(self, _root):
+        return 0
+
+    def value(self, path, t_s, value):
+        self.values.setdefault(path, []).append((t_s, value))
+
+    def flush(self):
+        pass
+
+
+def test_a_window_gives_one_value_of_a_family_though_nodes_speak_in_between():
+    record, paper = make_record(seconds=1.0), Paper()
+    scene = Scene(paper, zero_ns=record.t0_ns)
+    for k in range(3):
+        for channel, snr in (("b3_x", 4.0), ("b3_y", 26.0 + k), ("b4_x", 11.0)):
+            values = (results.FeatureValue("bpfo_snr", "bearing_3", snr, "dB"),)
+            judged = features(**window(record, k), source="envelope", channel=channel, values=values)
+            level = (results.FeatureValue("kurtosis", "", 3.0, "1"),)
+            other = features(**window(record, k), source="kurtosis", channel=channel, values=level)
+            for one in (judged, other):
+                scene.add(to_msg(one, pure_types()))
+    scene.flush()
+    expected = [(1.0 + 0.5 * k, 26.0 + k) for k in range(3)]
+    assert paper.values["faults/BPFO"] == expected
+    assert paper.values["faults_by_part/bearing_3/BPFO"] == expected

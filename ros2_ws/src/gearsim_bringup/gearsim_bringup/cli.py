@@ -118,8 +118,9 @@ def _complain(line: str, code: int) -> int:
 
 def _report(error: Exception) -> int:
     from gearsim_bringup.ui import JobFailedError
+    from gearsim_io.bags import BagError
 
-    if isinstance(error, (JobFailedError, OSError)):
+    if isinstance(error, (JobFailedError, BagError, OSError)):
         return _complain(str(error), FAILED)
     folder = Path(os.environ.get("GEARSIM_STATE", ".gearsim")) / "log"
     try:

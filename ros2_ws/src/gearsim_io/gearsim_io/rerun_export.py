@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,16 @@ WINDOW = (1600, 1000)
 _POINTS = 20_000
 _PICTURE_POINTS = 3_000
 _PICTURE_SPECTRA_S = 3.0
-_TIMEOUT_S = 120.0
+# The viewer draws what a recording of some MB holds within seconds, and may take long where all cores are busy.
+_DRAWS_S, _DRAWS_S_PER_MB = 300.0, 30.0
+_SWITCH_S = 120.0
+_TELL_EVERY = 256  # messages
+
+Progress = Callable[[float], None]
+
+
+def _silent(_share: float) -> None:
+    pass
 
 
 def export(
@@ -33,6 +42,7 @@ def export(
     out: Path | str,
     full: bool = False,
     overwrite: bool = False,
+    progress: Progress = _silent,
 ) -> Overview:
     """Write a bag as a rerun recording with its own arrangement of views.
 
@@ -48,6 +58,8 @@ def export(
         are kept in full.
     overwrite : bool
         Replace the file if it exists.
+    progress : callable
+        Told the share that is done, from 0 to 1.
 
     Returns
     -------
@@ -66,7 +78,7 @@ def export(
     target = _target(out, ".rrd", overwrite)
     overview = _look_through(bag)
     points_per_s = float("inf") if full else max(20.0, _POINTS / max(overview.end_s, 1e-3))
-    _write(bag, target, overview, points_per_s, picture=False)
+    _write(bag, target, overview, points_per_s, picture=False, progress=progress)
     return overview
 
 
@@ -75,6 +87,7 @@ def png(
     out: Path | str,
     overwrite: bool = False,
     window: tuple[int, int] = WINDOW,
+    progress: Progress = _silent,
 ) -> Overview:
     """A picture of a bag, drawn by rerun's viewer without a screen (by software, so it takes seconds).
 
@@ -92,7 +105,7 @@ def png(
     with tempfile.TemporaryDirectory(prefix="gearsim-view-") as folder:
         small = Path(folder) / "picture.rrd"
         points_per_s = _PICTURE_POINTS / max(overview.end_s, 1e-3)
-        _write(bag, small, overview, points_per_s, picture=True)
+        _write(bag, small, overview, points_per_s, picture=True, progress=progress)
         screenshot(small, target, window)
     return overview
 
@@ -107,7 +120,7 @@ def screenshot(recording: Path, out: Path, window: tuple[int, int] = WINDOW) -> 
     BagError
         If it draws nothing for another reason.
     """
-    viewer = viewer_path()
+    viewer, patience_s = viewer_path(), _DRAWS_S + _DRAWS_S_PER_MB * recording.stat().st_size / 1e6
     with tempfile.TemporaryDirectory(prefix="gearsim-rerun-") as home:
         environment = quiet_environment(viewer, Path(home))
         command = [str(viewer), "--headless", "--bind", "127.0.0.1", "--port", "auto"]
@@ -117,10 +130,11 @@ def screenshot(recording: Path, out: Path, window: tuple[int, int] = WINDOW) -> 
             # from standard input the viewer takes it whole.
             with open(recording, "rb") as data:
                 done = subprocess.run(
-                    command, env=environment, stdin=data, capture_output=True, timeout=_TIMEOUT_S, check=False
+                    command, env=environment, stdin=data, capture_output=True, timeout=patience_s, check=False
                 )
         except subprocess.TimeoutExpired:
-            raise BagError(f"{out}: the viewer drew nothing within {_TIMEOUT_S:g} s") from None
+            way = f"rerun may open it in a window: ./gearsim view BAG --out {out.stem}.rrd"
+            raise BagError(f"{out}: the viewer drew nothing within {patience_s:.0f} s; {way}") from None
     if out.is_file() and out.stat().st_size > 0:
         return
     said = (done.stderr + done.stdout).decode("utf-8", "replace")
@@ -172,7 +186,7 @@ def quiet_environment(viewer: Path, home: Path) -> Mapping[str, str]:
     environment = {key: value for key, value in os.environ.items() if key not in moved}
     environment.update(HOME=str(home), RUST_LOG="error")
     off = [str(viewer), "analytics", "disable"]
-    subprocess.run(off, env=environment, capture_output=True, timeout=_TIMEOUT_S, check=False)
+    subprocess.run(off, env=environment, capture_output=True, timeout=_SWITCH_S, check=False)
     return environment
 
 
@@ -198,33 +212,54 @@ def _target(out: Path | str, suffix: str, overwrite: bool) -> Path:
     return path
 
 
-def _write(bag: Path | str, out: Path, overview: Overview, points_per_s: float, picture: bool) -> None:
+def _write(
+    bag: Path | str,
+    out: Path,
+    overview: Overview,
+    points_per_s: float,
+    picture: bool,
+    progress: Progress = _silent,
+) -> None:
+    try:
+        _fill(bag, out, overview, points_per_s, picture, progress)
+    except BaseException as error:
+        out.unlink(missing_ok=True)  # half a recording would open and mislead
+        if isinstance(error, (OSError, RuntimeError)) and not isinstance(error, BagError):
+            raise BagError(f"{out}: not written to the end ({error})") from None
+        raise
+
+
+def _fill(
+    bag: Path | str,
+    out: Path,
+    overview: Overview,
+    points_per_s: float,
+    picture: bool,
+    progress: Progress,
+) -> None:
     import rerun as rr
 
     from gearsim_io.scene import Canvas, Scene, blueprint
 
     focus = overview.focus()
     stream = rr.RecordingStream(APPLICATION, recording_id=Path(bag).name)
-    try:
-        stream.save(str(out))
-        stream.log("summary", rr.TextDocument(overview.summary(), media_type="text/markdown"), static=True)
-        scene = Scene(Canvas(stream), points_per_s, focus.zooms, focus.channel, picture, overview.zero_ns)
-        for message in read_bag(bag):
-            if message.type.rsplit("/", 1)[-1] in scene.types:
-                decoded = decode(message)
-                if not (picture and _is_early(message, decoded, overview)):
-                    scene.add(decoded)
-        for name, t_s, colour in overview.marks():
-            scene.mark(name, t_s, colour)
-        limit = _round_up(max(scene.peaks["zoom"], scene.peaks["accel"]))
-        final = replace(focus, limit=limit, speed_span_hz=scene.speed_span_hz)
-        rr.send_blueprint(blueprint(final, picture), recording=stream)
-        scene.flush()
-        stream.disconnect()
-    except (OSError, RuntimeError) as error:
-        if isinstance(error, BagError):
-            raise
-        raise BagError(f"{out}: not written to the end ({error})") from None
+    stream.save(str(out))
+    stream.log("summary", rr.TextDocument(overview.summary(), media_type="text/markdown"), static=True)
+    scene = Scene(Canvas(stream), points_per_s, focus.zooms, focus.channel, picture, overview.zero_ns)
+    for number, message in enumerate(read_bag(bag)):
+        if number % _TELL_EVERY == 0:
+            progress(overview.share(message.t_ns))
+        if message.type.rsplit("/", 1)[-1] in scene.types:
+            decoded = decode(message)
+            if not (picture and _is_early(message, decoded, overview)):
+                scene.add(decoded)
+    for name, t_s, colour in overview.marks():
+        scene.mark(name, t_s, colour)
+    limit = _round_up(max(scene.peaks["zoom"], scene.peaks["accel"]))
+    final = replace(focus, limit=limit, speed_span_hz=scene.speed_span_hz)
+    rr.send_blueprint(blueprint(final, picture), recording=stream)
+    scene.flush()
+    stream.disconnect()
 
 
 def _round_up(peak: float) -> float:

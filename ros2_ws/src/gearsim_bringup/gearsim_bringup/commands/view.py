@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import click
+from rich.progress import Progress, TaskID
 
 from gearsim_bringup.options import ANY_PATH, example, json_option
 from gearsim_bringup.ui import Voice
@@ -34,9 +36,18 @@ def command(
         raise click.UsageError("say what to write: --out X.rrd, --png X.png, or both")
     voice = Voice(json_mode=json_mode)
     if out is not None:
-        rerun_export.export(bag, out, full=full, overwrite=overwrite)
+        with voice.progress() as bar:
+            task = bar.add_task(f"writing {out.name}", total=1.0)
+            told = partial(_tell, bar, task)
+            rerun_export.export(bag, out, full=full, overwrite=overwrite, progress=told)
         voice.say(f"written: {out}; open it with: .venv/bin/rerun --bind 127.0.0.1 {out}")
     if picture is not None:
-        rerun_export.png(bag, picture, overwrite=overwrite)
+        with voice.progress() as bar:
+            task = bar.add_task(f"drawing {picture.name}", total=1.0)
+            rerun_export.png(bag, picture, overwrite=overwrite, progress=partial(_tell, bar, task))
         voice.say(f"written: {picture}")
     voice.result({"rrd": None if out is None else str(out), "png": None if picture is None else str(picture)})
+
+
+def _tell(bar: Progress, task: TaskID, share: float) -> None:
+    bar.update(task, completed=share)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,10 @@ class Canvas:
         self.stream = stream
         self._chunk_rows = chunk_rows
         self._styled: set[str] = set()
+        self._below: Counter[str] = Counter()
         self._lanes: dict[str, dict[str, style.Rgb]] = {}
         self._waiting: dict[str, list[tuple[NDArray[np.float64], NDArray[Any]]]] = {}
+        self._counts: dict[str, int] = {}
 
     def at(self, t_s: float) -> None:
         """What is logged next belongs to this time."""
@@ -39,20 +42,21 @@ class Canvas:
         """Name and colour of a line, before its first value; a second time does nothing."""
         if path not in self._styled:
             self._styled.add(path)
+            self._below[path.partition("/")[0]] += 1
             lines = rr.SeriesLines(names=name, colors=colour, widths=width, aggregation_policy="MinMax")
             self.stream.log(path, lines, static=True)
 
     def lines_below(self, root: str) -> int:
-        """How many lines there are below an entity."""
-        return sum(path.startswith(f"{root}/") for path in self._styled)
+        """How many lines there are below an entity of the first level, such as `speed`."""
+        return self._below[root]
 
     def rows(self, path: str, times_s: NDArray[np.float64], values: NDArray[Any]) -> None:
         """More values of a line."""
         if not times_s.size:
             return
-        waiting = self._waiting.setdefault(path, [])
-        waiting.append((times_s, values))
-        if sum(part.size for part, _ in waiting) >= self._chunk_rows:
+        self._waiting.setdefault(path, []).append((times_s, values))
+        self._counts[path] = self._counts.get(path, 0) + times_s.size
+        if self._counts[path] >= self._chunk_rows:
             self._send(path)
 
     def value(self, path: str, t_s: float, value: float) -> None:
@@ -82,6 +86,7 @@ class Canvas:
 
     def _send(self, path: str) -> None:
         parts = self._waiting.pop(path)
+        del self._counts[path]
         times = np.concatenate([part for part, _ in parts])
         values = np.concatenate([part for _, part in parts])
         index = rr.TimeColumn(TIMELINE, duration=times)

@@ -81,9 +81,9 @@ def blueprint(focus: Focus, picture: bool = False) -> Any:
             (2, _faults()) if focus.has("Features") else None,
         ),
         _row(
-            (5, _kurtosis(focus)) if focus.has("Features") else None,
-            (4, _operating_point(focus)) if focus.has("TachoBatch", "Features", TORQUE) else None,
-            (6, _log()) if focus.has("Alarm") else None,
+            (4, _kurtosis(focus)) if focus.has("Features") else None,
+            (3, _operating_point(focus)) if focus.has("TachoBatch", "Features", TORQUE) else None,
+            (8, _log()) if focus.has("Alarm") else None,
         ),
     ]
     shares = [4 if focus.has("AlarmState", "GroundTruth") else 1, 4, 5, 4]

@@ -27,7 +27,8 @@ _ERROR = 2
 class Overview:
     """What a bag tells, as far as a reader of the views wants to know it.
 
-    Times are seconds from the stamp `zero_ns` of the first samples.
+    Times are seconds from the stamp `zero_ns` of the first samples; `log_ns` are the log times of the first
+    and the last message.
     """
 
     zero_ns: int | None = None
@@ -44,10 +45,16 @@ class Overview:
     kinds: set[str] = field(default_factory=set)
     gaps: int = 0
     lost_samples: int = 0
+    log_ns: tuple[int, int] = (0, 0)
 
     def time_s(self, t_ns: int) -> float:
         """Seconds from the first samples."""
         return (t_ns - (self.zero_ns or 0)) / 1e9
+
+    def share(self, t_ns: int) -> float:
+        """How far on in the bag a log time is, from 0 to 1."""
+        first, last = self.log_ns
+        return min(max((t_ns - first) / max(last - first, 1), 0.0), 1.0)
 
     @property
     def raised(self) -> list[Any]:
@@ -155,6 +162,7 @@ def look_through(path: Path | str) -> Overview:
     found = Overview()
     gaps = cdr.GapCounter()
     for message in read_bag(path):
+        found.log_ns = (found.log_ns[0] or message.t_ns, message.t_ns)
         _take(found, gaps, message)
     if found.zero_ns is None:
         raise InputError(str(path), "", "no samples", "a bag with at least one SampleBatch")

@@ -67,7 +67,6 @@ class Scene:
         self._outliner: Outliner | None = None
         self._torque_outliner: Outliner | None = None
         self._last_pulse_s: dict[str, float] = {}
-        self._window: tuple[str, int] | None = None
         self._best: dict[str, tuple[float, float]] = {}
         self.peaks: dict[str, float] = {"accel": 0.0, "zoom": 0.0, "kurtosis": 0.0}
         self.speed_span_hz = (math.inf, -math.inf)
@@ -197,10 +196,6 @@ class Scene:
 
     def _add_features(self, msg: Any) -> None:
         t_s = self.time_s(stamp_ns(msg)) + msg.sample_count / msg.sample_rate
-        window = (msg.source, msg.first_sample)
-        if window != self._window:
-            self._send_snr()
-            self._window = window
         for value in msg.values:
             if value.name in _PER_CHANNEL and math.isfinite(value.value):
                 path = style.entity(value.name, msg.channel)
@@ -216,18 +211,26 @@ class Scene:
             self._speed(msg.speed_source, label, np.array([t_s]), np.array([msg.speed]))
 
     def _add_snr(self, t_s: float, component: str, stem: str, snr_db: float) -> None:
-        """Of all channels the one that shows a family best counts, for the machine and for each part."""
+        """Of all channels the one that shows a family best counts, for the machine and for each part.
+
+        Messages of other nodes may come between those of a window, so each line waits for a value of
+        another time: sent earlier, the best of some channels would look like a dip.
+        """
+        if not math.isfinite(snr_db):
+            return
         label = style.family_name(stem)
         for path, name in (
             (style.entity("faults", label), label),
             (style.entity("faults_by_part", component, label), f"{label} {component}"),
         ):
-            if math.isfinite(snr_db) and snr_db > self._best.get(path, (0.0, -math.inf))[1]:
-                self._canvas.line(path, name, style.family(label))
-                self._best[path] = (t_s, snr_db)
+            self._canvas.line(path, name, style.family(label))
+            before_s, best_db = self._best.get(path, (t_s, -math.inf))
+            if before_s != t_s:
+                self._canvas.value(path, before_s, best_db)
+                best_db = -math.inf
+            self._best[path] = (t_s, max(best_db, snr_db))
 
     def _send_snr(self) -> None:
-        """A window is over when the features of the next one come."""
         for path, (t_s, snr_db) in self._best.items():
             self._canvas.value(path, t_s, snr_db)
         self._best.clear()

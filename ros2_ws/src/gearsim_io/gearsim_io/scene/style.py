@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 Rgb = tuple[int, int, int]
 
 WAVEFORM: Rgb = (110, 170, 230)
@@ -55,6 +57,7 @@ def family_name(stem: str) -> str:
     return next((name for name in _FAMILIES if name.lower() == stem.lower()), stem.upper())
 
 
+@lru_cache(maxsize=4096)
 def entity(*parts: str) -> str:
     """An entity path of free texts; what a path cannot hold becomes `_`."""
     allowed = ("".join(c if c.isalnum() or c in "_-." else " " for c in part) for part in parts)
