@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from judge_signals import gearbox, measured, steady, turns
 
-from gearsim_dsp.judges.shaft import bearing_levels, judge_shafts, undecided_orders
+from gearsim_dsp.judges import levels
+from gearsim_dsp.judges.levels import bearing_levels
+from gearsim_dsp.judges.registry import judge_all
+from gearsim_dsp.judges.shaft import judge_shafts, undecided_orders
 from gearsim_dsp.judges.supply import supply_shares
 from gearsim_dsp.speed import Phase, ShaftSpeed
 
@@ -165,3 +168,20 @@ def test_the_supply_that_the_nameplate_states_is_the_only_one_in_doubt():
     stated = replace(box.machine, line_frequency_hz=60.0)
     shares = supply_shares(replace(box, machine=stated), np.arange(1.0, 9.0))
     assert np.flatnonzero(shares > 0.5).tolist() == [5]
+
+
+def test_the_levels_are_measured_once_for_all_judges(monkeypatch):
+    """Gears, shafts and remarks ask for them."""
+    measured_at = []
+    original = levels._velocities
+
+    def counted(box, channel, shaft):
+        measured_at.append((box.sample_count, channel))
+        return original(box, channel, shaft)
+
+    monkeypatch.setattr(levels, "_velocities", counted)
+    box, _ = judge({})
+    judge_all(box)
+    undecided_orders(box)
+    whole = [channel for samples, channel in measured_at if samples == box.sample_count]
+    assert sorted(whole) == sorted(box.channels)

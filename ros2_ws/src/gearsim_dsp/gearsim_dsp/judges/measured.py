@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,8 @@ from gearsim_io.nameplate import GearMesh, Machine
 from gearsim_io.record import PulseTrain, Record
 
 __all__ = ["Measured", "wheels_on"]
+
+Kept = TypeVar("Kept")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,7 @@ class Measured:
     speed: ShaftSpeed
     encoders: dict[str, PulseTrain] = field(default_factory=dict)
     _averages: dict[tuple[object, ...], Average | None] = field(default_factory=dict)
+    _kept: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         lengths = {values.size for values in self.channels.values()}
@@ -100,6 +105,12 @@ class Measured:
             low, high = speed.ci95_hz
             speed = replace(speed, value_hz=float(value), ci95_hz=(scale * low, scale * high), phase=phase)
         return Measured(self.machine, self.sample_rate_hz, self.unit, channels, speed)
+
+    def once(self, name: str, make: Callable[[Measured], Kept]) -> Kept:
+        """What several judges ask for, made by the first of them and kept under its name."""
+        if name not in self._kept:
+            self._kept[name] = make(self)
+        return cast(Kept, self._kept[name])
 
     def average(self, channel: str, shaft_ratio: float, samples_per_turn: int) -> Average | None:
         """Synchronous average of a channel over one turn of a shaft; None with fewer than four turns."""
