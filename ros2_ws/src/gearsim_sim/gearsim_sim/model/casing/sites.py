@@ -1,0 +1,108 @@
+"""Where sensors may sit on a casing: named places with a direction, found as nodes of the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsim_io.errors import InputError
+from gearsim_sim.model.casing.geometry import MASTERS, bore_centres_m
+from gearsim_sim.model.casing.params import CasingParams
+from gearsim_sim.model.casing.reduced import Site
+from gearsim_sim.model.casing.reduction import Reduction
+from gearsim_sim.model.casing.structure import MeshedStructure
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class SitePlace:
+    """A sensor's name, place [m] and direction (a unit vector)."""
+
+    name: str
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+
+
+def default_sites(params: CasingParams) -> tuple[SitePlace, ...]:
+    """Sites that every casing has.
+
+    `b1_x`, `b1_y`, ...: on the ring that holds the bearing, outside and above the bore (in the lumped models
+    the pedestal bears these names); `b1_top_y`, ...: on the upper edge above the bearing, where the thesis
+    has its accelerometer (5.2); the middles of floor and walls, each across its plate.
+    """
+    box, rings = params.box, params.rings
+    top = box.height_m - box.shaft_height_m
+    middle = top - box.height_m / 2
+    radius = (rings.bore_radius_m + rings.outer_radius_m) / 2
+    found = []
+    for name in MASTERS:
+        x, _, z = bore_centres_m(params)[name]
+        outside = z + np.sign(z) * rings.thickness_m / 2
+        found += [SitePlace(f"{name}_{axis}", (x, radius, outside), _AXES[axis]) for axis in "xy"]
+        found.append(SitePlace(f"{name}_top_y", (x, top, z), _AXES["y"]))
+    found.append(SitePlace("floor_y", (0.0, -box.shaft_height_m, 0.0), _AXES["y"]))
+    for name, sign in (("input", -1), ("output", 1)):
+        found.append(SitePlace(f"side_{name}_x", (sign * box.length_m / 2, middle, 0.0), _AXES["x"]))
+    for name, sign in (("a", -1), ("b", 1)):
+        found.append(SitePlace(f"end_{name}_z", (0.0, middle, sign * box.width_m / 2), _AXES["z"]))
+    return tuple(found)
+
+
+def parse_site(text: str) -> SitePlace:
+    """A site as people write it: `NAME:X,Y,Z:DIRECTION` in metres; direction x, -y, ... or three numbers."""
+    expected = "NAME:X,Y,Z:DIRECTION as in top:0.05,0.1,0:y"
+    pieces = text.split(":")
+    if len(pieces) != 3 or not pieces[0].strip():
+        raise InputError("sensor", "", text, expected)
+    name, place, way = (piece.strip() for piece in pieces)
+    position = _three(text, place, expected)
+    axis, sign = way.lstrip("+-"), -1.0 if way.startswith("-") else 1.0
+    direction = _AXES.get(axis) or _three(text, way, expected)
+    scaled = np.array(direction) * (sign if axis in _AXES else 1.0)
+    length = float(np.linalg.norm(scaled))
+    if length == 0:
+        raise InputError("sensor", name, text, "a direction other than 0,0,0")
+    x, y, z = (float(value) for value in scaled / length)
+    return SitePlace(name, position, (x, y, z))
+
+
+def _three(text: str, numbers: str, expected: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(number) for number in numbers.split(","))
+    except ValueError:
+        raise InputError("sensor", "", text, expected) from None
+    if not np.isfinite([x, y, z]).all():
+        raise InputError("sensor", "", text, expected)
+    return x, y, z
+
+
+def site_nodes(structure: MeshedStructure, places: Iterable[SitePlace], reach_m: float) -> list[int]:
+    """Node of each site; InputError if a place is farther than `reach_m` off, or a name used twice."""
+    nodes, names = [], set()
+    for place in places:
+        node, distance = structure.mesh.nearest(np.array(place.position_m))
+        if distance > reach_m:
+            at = ", ".join(f"{value:g}" for value in place.position_m)
+            what = f"({at}) m, {1000 * distance:.3g} mm off the nearest node"
+            raise InputError(structure.name, f"sensor {place.name}", what, f"at most {1000 * reach_m:.3g} mm")
+        if place.name in names:
+            raise InputError(structure.name, "sensor", place.name, "each name once")
+        names.add(place.name)
+        nodes.append(node)
+    return nodes
+
+
+def recover_sites(
+    structure: MeshedStructure, reduction: Reduction, places: Iterable[SitePlace], reach_m: float
+) -> tuple[Site, ...]:
+    """Recovery rows of sites, each at the node nearest to its place."""
+    places = tuple(places)
+    found = []
+    for place, node in zip(places, site_nodes(structure, places, reach_m), strict=True):
+        rows, correction = reduction.rows(structure.row(node, np.array(place.direction)))
+        x, y, z = (float(value) for value in structure.mesh.nodes_m[node])
+        found.append(Site(place.name, place.direction, (x, y, z), rows, correction))
+    return tuple(found)
