@@ -29,6 +29,8 @@ def files(tmp_path):
     (tmp_path / "syntax.yaml").write_text("model: [lpm34\n")
     (tmp_path / "key.yaml").write_text("operating_point: {speed: 10 Hz, laod: 5 N*m}\n")
     (tmp_path / "model.yaml").write_text("model: lpm43\noperating_point: {speed: 10 Hz, load: 5 N*m}\n")
+    plate = "name: plate\nnameplate: {reference_shaft: shaft, shafts: {shaft: {}}}\n"
+    (tmp_path / "plate.yaml").write_text(plate)
     (tmp_path / "taken").mkdir()
     return tmp_path
 
@@ -61,7 +63,7 @@ def files(tmp_path):
         ("diagnose {0}/nothing", "got nothing there"),
         ("twin {0}/nothing --machine mfpt --model bearing5", "got nothing there"),
         ("twin {0}/taken --machine mfpt --model bearin5", "did you mean bearing5?"),
-        ("twin {0}/taken --machine gear0 --model lpm34", "nothing can be simulated (docs/rigs.md"),
+        ("twin {0}/taken --machine {0}/plate.yaml --model lpm34", "nothing can be simulated (docs/rigs.md"),
         (
             "twin {0}/taken --machine mfpt --model bearing5 --holdout {0}/taken",
             "of MEASURED once more, expected a recording that nothing is fitted to",

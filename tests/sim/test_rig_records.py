@@ -175,11 +175,13 @@ def test_what_cannot_be_is_named(tmp_path, old, new, expected):
         load_bearing_rig_params(rig_file(tmp_path, (old, new)))
 
 
-def test_a_rig_has_one_bearing():
+def test_a_rig_has_one_bearing(tmp_path):
     with pytest.raises(InputError, match=r"kind.*parallel_shaft.*bearing_rig, as machine mfpt has it"):
         load_bearing_rig_params("unsw_parallel")
+    plate = (tmp_path / "plate_only.yaml").resolve()
+    plate.write_text(machine_file("gear0").read_text(encoding="utf-8").partition("\nmodel:")[0], "utf-8")
     with pytest.raises(InputError, match=r"kind.*None.*bearing_rig"):
-        load_bearing_rig_params("gear0")
+        load_bearing_rig_params(plate)
 
 
 def test_a_channel_that_the_model_lacks_is_named():

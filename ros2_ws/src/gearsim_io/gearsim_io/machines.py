@@ -164,7 +164,7 @@ def load_machine(name_or_path: str | Path) -> Machine:
         shafts=tuple(_shaft(name, shaft, ratios, plate) for name, shaft in plate.shafts.items()),
         gear_meshes=tuple(GearMesh(name, **mesh.model_dump()) for name, mesh in plate.gear_meshes.items()),
         planetary_stages=stages,
-        bearings=tuple(_bearing(name, bearing) for name, bearing in plate.bearings.items()),
+        bearings=tuple(make_bearing(name, bearing) for name, bearing in plate.bearings.items()),
         channels=tuple(Channel(name, **channel.model_dump()) for name, channel in plate.channels.items()),
         tacho_shafts=plate.tacho_shafts,
         encoder_shafts=plate.encoder_shafts,
@@ -181,7 +181,8 @@ def _shaft(name: str, shaft: ShaftModel, ratios: Mapping[str, float], plate: Nam
     return Shaft(name, ratios[name], nominal)
 
 
-def _bearing(name: str, bearing: BearingModel) -> Bearing:
+def make_bearing(name: str, bearing: BearingModel) -> Bearing:
+    """The bearing of that name, as its section describes it."""
     return Bearing(
         name=name,
         shaft=bearing.shaft,

@@ -58,11 +58,7 @@ def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
         wheels=() if pair is None else _wheels(params, pair),
         rigid=system.direction(rigid),
         encoders={shaft: (i, {_ENCODERS[i]: 1.0}) for i, shaft in enumerate(shafts)},
-        sites={
-            f"b{number}_{axis}": {f"{axis}_{'p' if params.pedestals else 's'}{number}": 1.0}
-            for number in range(1, 5)
-            for axis in "xy"
-        },
+        sites=_sites(params),
         limits=Limits(
             speed_hz=drive.speed_hz,
             load_nm=drive.load_nm,
@@ -79,6 +75,15 @@ def make_parallel_shaft(params: ParallelParams, seed: int) -> Plant:
         shafts=parallel_shafts(params, SENSE),
         mounts=parallel_mounts(params),
     )
+
+
+def _sites(params: ParallelParams) -> dict[str, Vector]:
+    """Pedestals, else the shaft's ends in the bearings; channels by their own names as well."""
+    body = "p" if params.pedestals else "s"
+    places: dict[str, Vector] = {
+        f"b{number}_{axis}": {f"{axis}_{body}{number}": 1.0} for number in range(1, 5) for axis in "xy"
+    }
+    return places | {channel: places[site] for channel, site in params.model.sites.items()}
 
 
 def _coupling(end: TorsionalEnd, first: str, second: str) -> StateRow:

@@ -28,6 +28,7 @@ from gearsim_sim.params.teeth import Teeth
 
 BEARINGS = ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
 MODEL_KIND = "parallel_shaft"
+Site = Literal["b1_x", "b1_y", "b2_x", "b2_y", "b3_x", "b3_y", "b4_x", "b4_y"]
 # Working pressure angles of spur gears that can be made; 14.5 to 25 degrees are usual.
 _FIT_M = 1e-7  # to which distances are written down
 _PRESSURE_ANGLES_RAD = (math.radians(10), math.radians(35))
@@ -106,6 +107,10 @@ class ParallelModel(Strict):
 
     kind: Literal["parallel_shaft"]
     """What kind of machine the section describes."""
+    stage: str = ""
+    """The gear mesh of the nameplate that is modelled, where there are several."""
+    sites: dict[str, Site] = Field(default_factory=dict)
+    """Where each channel is that is not named after its place."""
     drive: Drive
     flywheel_1: TorsionalEnd
     flywheel_2: TorsionalEnd
@@ -208,7 +213,7 @@ def load_parallel_params(
     read = read_model_section(machine, MODEL_KIND, "unsw_parallel", overrides, source)
     plate, where = read.plate, read.where
     model = validate(ParallelModel, _with_own_bearings(read.content), where, require_source=True)
-    mesh = _single_mesh(where, plate)
+    mesh = _modelled_mesh(where, plate, model.stage)
     params = ParallelParams(
         where=where,
         model=model,
@@ -218,6 +223,7 @@ def load_parallel_params(
         output_shaft=mesh.driven_shaft,
     )
     _check(params)
+    _check_sites(params, plate)
     return params
 
 
@@ -234,12 +240,24 @@ def _with_own_bearings(section: Mapping[str, Any]) -> dict[str, Any]:
     return {**section, "seats": {name: completed(seat) for name, seat in seats.items()}}
 
 
-def _single_mesh(where: str, plate: Machine) -> GearMesh:
-    if len(plate.gear_meshes) != 1:
-        raise InputError(where, "kind", f"{len(plate.gear_meshes)} gear meshes", "one gear mesh in nameplate")
-    mesh = plate.gear_meshes[0]
+def _modelled_mesh(where: str, plate: Machine, stage: str) -> GearMesh:
+    """The stage with its pinion, the wheel that stands for the input, on the reference shaft.
+
+    Where power flows to the reference shaft the other flanks carry, at the same orders.
+    """
+    meshes = [mesh for mesh in plate.gear_meshes if stage in ("", mesh.name)]
+    if len(meshes) != 1:
+        names = ", ".join(mesh.name for mesh in plate.gear_meshes)
+        found = f"no gear mesh {stage}" if stage else f"{len(meshes)} gear meshes"
+        expected = f"stage with one of {names}" if names else "one gear mesh in nameplate"
+        raise InputError(where, "kind", found, expected)
+    mesh = meshes[0]
+    if mesh.driven_shaft == plate.reference_shaft:
+        shafts = (mesh.driven_shaft, mesh.driving_shaft)
+        return GearMesh(mesh.name, *shafts, mesh.driven_teeth, mesh.driving_teeth)
     if mesh.driving_shaft != plate.reference_shaft:
-        raise InputError(where, "kind", plate.reference_shaft, "the driving shaft as reference_shaft")
+        expected = "the driving or the driven shaft as reference_shaft"
+        raise InputError(where, "kind", plate.reference_shaft, expected)
     return mesh
 
 
@@ -269,6 +287,14 @@ def _check(params: ParallelParams) -> None:
         raise InputError(where, "drive.speed", model.drive.speed_hz, f"<= {model.drive.speed_limit_hz} Hz")
     if model.drive.load_nm > model.drive.load_limit_nm:
         raise InputError(where, "drive.load", model.drive.load_nm, f"<= {model.drive.load_limit_nm} N m")
+
+
+def _check_sites(params: ParallelParams, plate: Machine) -> None:
+    channels = [channel.name for channel in plate.channels]
+    for name in params.model.sites:
+        if name not in channels:
+            expected = "one of the channels " + ", ".join(channels)
+            raise InputError(params.where, f"sites.{name}", name, expected)
 
 
 def _check_teeth(params: ParallelParams) -> None:

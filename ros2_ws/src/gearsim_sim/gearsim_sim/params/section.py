@@ -11,6 +11,7 @@ from gearsim_io.errors import InputError
 from gearsim_io.machines import load_machine, read_machine_file
 from gearsim_io.nameplate import Machine
 from gearsim_sim.params.as_built import PREFIX, as_built
+from gearsim_sim.params.assumed_bearings import with_assumed_bearings
 from gearsim_sim.params.overrides import override
 
 
@@ -18,7 +19,7 @@ from gearsim_sim.params.overrides import override
 class ModelSection:
     """What a machine description holds for the simulator; `where` names it in errors.
 
-    `plate` is the nameplate with the bearings as they are built.
+    `plate` is the nameplate with the bearings as they are built, or as assumed where it tells none.
     """
 
     plate: Machine
@@ -57,6 +58,7 @@ def read_model_section(
     if not isinstance(section, dict) or section.get("kind") != kind:
         found = section.get("kind") if isinstance(section, dict) else section
         raise InputError(where, "kind", found, f"{kind}, as machine {example} has it")
+    plate, section = with_assumed_bearings(plate, section, where)
     if overrides:
         built = {name: value for name, value in overrides.items() if name.startswith(PREFIX)}
         plate = as_built(plate, built, source or where)

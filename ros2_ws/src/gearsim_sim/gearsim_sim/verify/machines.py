@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import machine_names
+from gearsim_io.machines import load_machine, machine_names
 from gearsim_sim.engine import Engine
 from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.plants import make_plant
@@ -24,6 +24,11 @@ def model_names() -> tuple[str, ...]:
     return tuple(MODELS)
 
 
+def documented_first() -> tuple[str, ...]:
+    """Shipped machines: those whose nameplate tells their bearings before those that have assumed ones."""
+    return tuple(sorted(machine_names(), key=lambda name: (not load_machine(name).bearings, name)))
+
+
 @cache
 def machine_of(model: str) -> tuple[str, Any]:
     """The first shipped machine that this model can be: its name, its parameters.
@@ -33,7 +38,7 @@ def machine_of(model: str) -> tuple[str, Any]:
     LookupError
         If there is none: then nobody could try the model.
     """
-    for machine in machine_names():
+    for machine in documented_first():
         try:
             running = MODELS[model](_smallest_scenario(model, machine))
         except InputError:
