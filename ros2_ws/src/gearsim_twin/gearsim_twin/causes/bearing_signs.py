@@ -303,6 +303,7 @@ def finding_modulation(finding: Finding) -> float:
 
 
 def _from_finding(finding: Finding, view: View) -> Sign:
+    finding = _at_speed_of(view, finding)
     shares = finding.evidence.get("component_shares")
     share = float(shares[finding.component]) if isinstance(shares, dict) else 1.0
     return Sign(
@@ -317,6 +318,13 @@ def _from_finding(finding: Finding, view: View) -> Sign:
         finding,
         view.machine.bearing(finding.component).rolling_elements,
     )
+
+
+def _at_speed_of(view: View, finding: Finding) -> Finding:
+    """The order in turns of the view's shaft, where the windows told only a mean speed of their own."""
+    if view.phase is not None or not finding.found_hz > 0:
+        return finding
+    return replace(finding, found_order=finding.found_hz / view.speed_hz)
 
 
 def _from_evidence(evidence: FamilyEvidence, shares: dict[str, float], view: View) -> Sign:
