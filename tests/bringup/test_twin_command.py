@@ -76,15 +76,16 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     """What the judge was asked; it answers at once."""
     asked: dict[str, object] = {}
 
-    def judge(case, settings, out, tell):
+    def judge(case, settings, out, tell, show):
         tell("simulating")
         out.write_text("machine: unsw_parallel\n", encoding="utf-8")
-        asked.update(case=case, settings=settings, out=out)
+        asked.update(case=case, settings=settings, out=out, show=show)
         if "fails" in asked:
             raise asked["fails"]
         return Said(out)
 
     monkeypatch.setattr("gearsim_twin.judge.judge", judge)
+    monkeypatch.setattr("gearsim_bringup.twin_report.page.make_twin_page", lambda verdict: verdict.words())
     return asked
 
 
@@ -92,7 +93,7 @@ def twin(*words: str | Path) -> int:
     return cli.main(["twin", *map(str, words), "--machine", "unsw_parallel", "--model", "lpm34"])
 
 
-def test_json_is_one_object_and_the_folder_holds_both_files(bag, judged, tmp_path, capsys):
+def test_json_is_one_object_and_the_folder_holds_all_files(bag, judged, tmp_path, capsys):
     out = tmp_path / "report"
     assert twin(bag, "--json", "--report", out, "--seed", "5", "--workers", "1") == 0
     printed = capsys.readouterr()
@@ -103,7 +104,9 @@ def test_json_is_one_object_and_the_folder_holds_both_files(bag, judged, tmp_pat
     assert "twin: simulating" in printed.err
     assert printed.err.count("note: ") == 2
     assert "note: bag: the lines tell another speed" in printed.err
-    assert {path.name for path in out.iterdir()} == {"twin.json", "extended.yaml"}
+    assert {path.name for path in out.iterdir()} == {"twin.json", "extended.yaml", "report.html"}
+    assert (out / "report.html").read_text() == "The model misses mains_interference."
+    assert judged["show"]
     assert json.loads((out / "twin.json").read_text()) == content
     assert (judged["settings"].seed, judged["settings"].workers) == (5, 1)
     assert judged["case"].split
@@ -184,3 +187,6 @@ def test_the_whole_way_from_a_bag_to_a_model_that_runs(tmp_path, capsys):
     extended = Path(content["extended_model"])
     assert extended.parent == tmp_path / "report"
     assert to_record(load_scenario(extended), 0.2).channels == ("accel",)
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "Map of discrepancies" in page
+    assert "Not shown" not in page

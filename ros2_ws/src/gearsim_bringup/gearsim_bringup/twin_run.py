@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 __all__ = ["FILES", "lines", "new_folder", "run_judge"]
 
-FILES = ("twin.json", "extended.yaml")
+FILES = ("twin.json", "extended.yaml", "report.html")
 _MOST_WORKERS = 2
 _SHOWN = 12
 
 
 def run_judge(case: Case, folder: Path, workers: int | None, seed: int) -> Verdict:
-    """Judge a case; verdict and extended model are in the folder, which is made, or nothing is.
+    """Judge a case; verdict, extended model and page are in the folder, which is made, or nothing is.
 
     Parameters
     ----------
@@ -41,6 +41,7 @@ def run_judge(case: Case, folder: Path, workers: int | None, seed: int) -> Verdi
     seed : int
         Of all random numbers.
     """
+    from gearsim_bringup.twin_report.page import make_twin_page
     from gearsim_twin.judge import judge
     from gearsim_twin.settings import Settings
 
@@ -48,9 +49,10 @@ def run_judge(case: Case, folder: Path, workers: int | None, seed: int) -> Verdi
     folder.mkdir(parents=True)
     try:
         with _progress() as tell:
-            verdict = judge(case, settings, folder / FILES[1], tell)
+            verdict = judge(case, settings, folder / FILES[1], tell, show=True)
         text = json.dumps(plain(verdict.to_json()), allow_nan=False, indent=1)
         (folder / FILES[0]).write_text(text + "\n", encoding="utf-8")
+        (folder / FILES[2]).write_text(make_twin_page(verdict), encoding="utf-8")
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -77,6 +79,7 @@ def lines(verdict: Verdict) -> list[str]:
     told += _discrepancy_lines(content["discrepancies"])
     if content["extended_model"]:
         told.append(f"extended model: {content['extended_model']}")
+        told.append(f"page: {Path(content['extended_model']).with_name(FILES[2])}")
     return told
 
 

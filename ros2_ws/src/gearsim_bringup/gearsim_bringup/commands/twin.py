@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, POSITIVE, SeveralValues, example, json_option
+from gearsim_bringup.options import ANY_PATH, POSITIVE, SPEED, SPEED_HELP, SeveralValues, example, json_option
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
@@ -42,12 +42,12 @@ class _Twin(SeveralValues):
 @click.option("--rate", type=POSITIVE, help="Sampling rate in Hz of files; must agree with what they say.")
 @click.option("--unit", help="Unit of the files' samples, such as g or m/s^2.")
 @click.option("--column", "--variable", "columns", multiple=True, help="Variable to take; repeatable.")
-@click.option("--speed", type=POSITIVE, help="Nominal speed of the reference shaft in Hz.")
+@click.option("--speed", type=SPEED, help=SPEED_HELP)
 @click.option(
     "--workers", type=click.IntRange(1, 256), help="Processes; default: as many as cores, two at most."
 )
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of all random numbers.")
-@click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for verdict and extended model.")
+@click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for page, verdict, extended model.")
 @json_option
 def command(
     measured: tuple[Path, ...],
@@ -66,7 +66,7 @@ def command(
 ) -> None:
     """Judge a simulation by measured records: what it gets wrong, why, and what mends it.
 
-    Without --report the extended model goes to a new folder out/twin_N.
+    Without --report page, verdict and extended model go to a new folder out/twin_N.
     """
     from gearsim_bringup.pages.folder import check_folder
     from gearsim_bringup.twin_run import lines, new_folder, run_judge

@@ -1,0 +1,1 @@
+"""The verdict of the judge as one page."""
