@@ -43,11 +43,24 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Round:
-    """Candidates of a round by descending probability, and the guesses that were not worth a fit."""
+    """A round of candidates.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Those fitted, by descending probability.
+    left : tuple of Screened
+        Guesses that were not worth a fit.
+    taken : int or None
+        Which candidate was taken.
+    untried : tuple of str
+        Causes that had guesses, for which no simulation was left.
+    """
 
     candidates: tuple[Candidate, ...]
     left: tuple[Screened, ...]
     taken: int | None
+    untried: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,10 +27,24 @@ _HALVED = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that a verdict rests on."""
+    """All that a verdict rests on.
+
+    Attributes
+    ----------
+    bench : Workbench
+        Of all channels and records for training, and those held out.
+    selection : Selection
+    tuned, final : Trial
+        The tuned and the extended model on that bench.
+    prior : Prior
+    scores : Scores
+    remarks : tuple of str
+    """
 
     bench: Workbench
     selection: Selection
+    tuned: Trial
+    final: Trial
     prior: Prior
     scores: Scores
     remarks: tuple[str, ...]
@@ -44,8 +58,8 @@ class Evidence:
 def concluded(evidence: Evidence) -> Verdict:
     """The verdict, its extended model not yet written."""
     selection, scores = evidence.selection, evidence.scores
-    before = discrepancies(evidence.comparisons(selection.tuned.trial))
-    after = material(discrepancies(evidence.comparisons(selection.final.trial)))
+    before = discrepancies(evidence.comparisons(evidence.tuned))
+    after = material(discrepancies(evidence.comparisons(evidence.final)))
     found = [_found(choice, k, selection) for k, choice in enumerate(selection.choices)]
     word = _word(bool(found), after)
     others = [each for choice in selection.choices for each in alternatives(choice, selection)]
@@ -110,8 +124,8 @@ def _attributed(evidence: Evidence, before: Sequence[Discrepancy]) -> tuple[Disc
         return tuple(before)
     model = selection.final.trial.model
     without = evidence.bench.trials([model.without(k) for k in range(len(model.extensions))])
-    final = _size(evidence, selection.final.trial)
-    tuned = _size(evidence, selection.tuned.trial)
+    final = _size(evidence, evidence.final)
+    tuned = _size(evidence, evidence.tuned)
     lacking = [_size(evidence, trial) for trial in without]
     places = evidence.bench.measured[evidence.bench.training[0]].places
     index = {place: k for k, place in enumerate(places)}

@@ -6,20 +6,23 @@ first, if there are any) -> causes chosen one by one -> scores on held-out recor
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from gearsim_io.errors import InputError
 from gearsim_twin.baseline import scenario_content
 from gearsim_twin.calibrate import Prior, calibrated, plain_prior
 from gearsim_twin.case import LEAST_PERIODS, Case, least_seconds
 from gearsim_twin.causes import CAUSES
 from gearsim_twin.causes.cause import Cause, Content
 from gearsim_twin.causes.context import Context
+from gearsim_twin.channels import telling_channels
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan, features, make_plan
+from gearsim_twin.compare.merged import discrepancies
 from gearsim_twin.conclude import Evidence, concluded
 from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
@@ -31,9 +34,10 @@ from gearsim_twin.score import score_models
 from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
 from gearsim_twin.simulated import Simulator
-from gearsim_twin.tuning import tuning_of
+from gearsim_twin.tuning import Tuning, tuning_of
 from gearsim_twin.verdict import Verdict
 from gearsim_twin.view import View
+from gearsim_twin.words import material
 from gearsim_twin.workbench import Job, Trial, Workbench
 
 __all__ = ["Bench", "judge"]
@@ -45,13 +49,22 @@ _LEAST_PERIODS = 8.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bench:
-    """A case made ready: views and nominal contents of all its records, and the plan of comparison."""
+    """A case made ready: views and nominal contents of all its records, and what is compared.
+
+    Attributes
+    ----------
+    plan : Plan
+        Of all channels.
+    search : Plan
+        Of the channels that the search for causes looks at.
+    """
 
     case: Case
     simulator: Simulator
     views: tuple[View, ...]
     nominal: tuple[Content, ...]
     plan: Plan
+    search: Plan
     settings: Settings
 
     @classmethod
@@ -61,60 +74,76 @@ class Bench:
         nominal = tuple(scenario_content(case, view) for view in views)
         training = range(len(case.training))
         simulated = [_simulated(simulator, k, nominal[k], settings) for k in training]
-        plan = make_plan(case, [*(views[k] for k in training), *simulated])
-        return cls(case, simulator, views, nominal, plan, settings)
+        both = [*(views[k] for k in training), *simulated]
+        plan = search = make_plan(case, both)
+        if len(plan.frame.channels) > settings.most_channels:
+            pairs = [
+                (features(views[k], plan), features(made, plan))
+                for k, made in zip(training, simulated, strict=True)
+            ]
+            limits = measuring_chain(plan, case.levels_known).limits
+            chosen = telling_channels(pairs, plan.frame.channels, settings.most_channels, limits)
+            search = make_plan(case, [view.only(chosen) for view in both])
+        return cls(case, simulator, views, nominal, plan, search, settings)
 
     @property
     def seconds(self) -> float:
         """Length of all simulations."""
         return _seconds(self.case, self.settings)
 
-    def workbench(self, records: Sequence[int], training: int) -> Workbench:
+    def workbench(self, records: Sequence[int], training: int, plan: Plan) -> Workbench:
         """Some records of the case, the first so many of them for training."""
         numbers = tuple(records)
+        then = partial(features, plan=plan)
 
         def run(jobs: Sequence[Job]) -> Sequence[Features | None]:
-            return self._made([(numbers[k], content) for k, content in jobs])
+            named = [(numbers[k], content) for k, content in jobs]
+            return self.simulator.tried(named, then, self.seconds, self.settings.seed)
 
         return Workbench(
-            measured=tuple(features(self.views[k], self.plan) for k in numbers),
+            measured=tuple(features(self.views[k], plan) for k in numbers),
             nominal=tuple(self.nominal[k] for k in numbers),
             training=tuple(range(training)),
             run=run,
-            nuisances=measuring_chain(self.plan, self.case.levels_known),
-            chance=self._chance(numbers, training),
+            nuisances=measuring_chain(plan, self.case.levels_known),
+            chance=self._chance(numbers, training, plan),
+            numbers=numbers,
         )
 
-    def _made(self, jobs: Sequence[Job]) -> Sequence[Features | None]:
-        """Features of simulations; None for those that the simulator refuses."""
-        then = partial(features, plan=self.plan)
-        try:
-            return self.simulator.derived(jobs, then, self.seconds, self.settings.seed)
-        except InputError:
-            return [None] if len(jobs) == 1 else [one for job in jobs for one in self._made([job])]
-
-    def _chance(self, numbers: Sequence[int], training: int) -> dict[int, Realisations]:
+    def _chance(self, numbers: Sequence[int], training: int, plan: Plan) -> dict[int, Realisations]:
         """What chance does to each record: that of the record for training with the most similar speed."""
-        then = partial(features, plan=self.plan)
-        known = {}
-        for k in range(training):
-            job = (numbers[k], self.nominal[numbers[k]])
-            seeds = range(self.settings.seed, self.settings.seed + self.settings.seeds)
-            found = [self.simulator.derived([job], then, self.seconds, seed)[0] for seed in seeds]
-            known[k] = realisations_of(found)
+        seeds = range(self.settings.seed, self.settings.seed + self.settings.seeds)
+        jobs = [(numbers[k], self.nominal[numbers[k]], seed) for k in range(training) for seed in seeds]
+        found = self.simulator.seeded(jobs, partial(features, plan=plan), self.seconds)
+        rows = [found[k * len(seeds) : (k + 1) * len(seeds)] for k in range(training)]
+        known = [realisations_of(row) for row in rows]
         speeds = [self.views[number].speed_hz for number in numbers]
-        nearest = [min(known, key=lambda k: abs(speeds[k] - own)) for own in speeds]
+        nearest = [min(range(training), key=lambda k: abs(speeds[k] - own)) for own in speeds]
         return {record: known[k] for record, k in enumerate(nearest)}
+
+    def told(self) -> tuple[int, ...]:
+        """Records for training that the search looks at: the first, and those under other conditions."""
+        training = range(len(self.case.training))
+        kept = [0]
+        while len(kept) < min(self.settings.most_records, len(training)):
+            left = [k for k in training if k not in kept]
+            kept.append(max(left, key=lambda k: min(self._apart(k, other) for other in kept)))
+        return tuple(sorted(kept))
+
+    def _apart(self, one: int, other: int) -> float:
+        """How different the conditions of two records are: speed, load and force by their ratios."""
+        pairs = zip(_conditions(self.nominal[one]), _conditions(self.nominal[other]), strict=True)
+        return sum(abs(math.log(max(a, 1e-9) / max(b, 1e-9))) for a, b in pairs)
 
     def context(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
         """What causes may look at."""
         records = bench.training
-        contents = {k: trial.model.content(bench.nominal[k]) for k in records}
+        contents = {bench.numbers[k]: trial.model.content(bench.nominal[k]) for k in records}
         shown = [trial.features[k] for k in records]
         tau = prior.tau_of(bench.stack.domains)
         return Context(
             case=self.case,
-            views=tuple(self.views[k] for k in records),
+            views=tuple(self.views[k] for k in contents),
             measured=tuple(bench.measured[k] for k in records),
             simulated=tuple(shown),
             comparison=tuple(compare(bench.measured[k], trial.features[k], tau) for k in records),
@@ -157,6 +186,7 @@ def judge(
     known = tuple(CAUSES.values()) if causes is None else tuple(causes)
     tell("reading angles and speeds")
     with Simulator(case, chosen.workers) as simulator:
+        simulator.prepare()
         tell("simulating the nominal model")
         bench = Bench.of(case, simulator, chosen)
         return _judged(bench, chosen, known, out, tell, show)
@@ -166,37 +196,68 @@ def _judged(
     bench: Bench, settings: Settings, causes: tuple[Cause, ...], out: Path | None, tell: Tell, show: bool
 ) -> Verdict:
     case = bench.case
-    train, held, healthy = len(case.training), len(case.holdout), len(case.healthy)
+    train, held = len(case.training), len(case.holdout)
     tuning = tuning_of(case.machine_path, case.model)
-    prior = plain_prior(tuning)
-    if healthy:
-        tell("calibrating on the healthy machine")
-        prior = calibrated(bench.workbench(range(train + held, train + held + healthy), healthy), prior)
-    work = bench.workbench(range(train + held), train)
+    prior = _prior(bench, tuning, tell)
+    held_out = range(train, train + held)
+    told = bench.told()
+    work = bench.workbench((*told, *held_out), len(told), bench.search)
     yard = prior.yard(work)
     tell("tuning the model")
     tuned = fit_tuning(work, yard, Model(prior.tuning, prior.tuning.nominal))
-    selection = select(work, yard, tuned, causes, partial(bench.context, work, prior), settings, tell)
+    context_of = partial(bench.context, work, prior)
+    selection = select(work, yard, tuned, causes, context_of, settings, tell, _nothing_left)
     tell("scoring on held-out records")
+    whole = work if bench.search is bench.plan and len(told) == train else None
+    whole = whole or bench.workbench(range(train + held), train, bench.plan)
     nominal = Model(tuning, tuning.nominal)
     models = [nominal, selection.tuned.trial.model, selection.final.trial.model]
-    trials = work.trials(models, (*work.training, *work.holdout))
+    trials = whole.trials(models, (*whole.training, *whole.holdout))
     names = ("baseline", "tuned_only", "extended")
     scores = score_models(
-        [work.measured[k] for k in work.holdout],
-        {name: [trial.features[k] for k in work.holdout] for name, trial in zip(names, trials, strict=True)},
+        [whole.measured[k] for k in whole.holdout],
+        {name: [trial.features[k] for k in whole.holdout] for name, trial in zip(names, trials, strict=True)},
         settings.seed,
     )
     remarks = dict.fromkeys([*case.remarks, *(each for view in bench.views for each in view.remarks)])
-    evidence = Evidence(work, selection, prior, scores, tuple(remarks))
+    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks))
     verdict = concluded(evidence)
     if show:
         tell("gathering what is shown")
-        verdict = replace(verdict, exhibit=exhibit_of(bench, work, selection, settings.seed))
+        verdict = replace(verdict, exhibit=exhibit_of(bench, whole, selection, settings.seed))
     if out is None:
         return verdict
-    content = selection.final.trial.model.content(work.nominal[0])
+    content = selection.final.trial.model.content(whole.nominal[0])
     return verdict.written(write_extended(out, content, verdict.comments()))
+
+
+def _nothing_left(context: Context) -> bool:
+    """Whether no difference is too large and too sure for a good model's own errors."""
+    return not material(discrepancies(context.comparison))
+
+
+def _prior(bench: Bench, tuning: Tuning, tell: Tell) -> Prior:
+    """What is known of machine and model beforehand: assumed, or taught by records of the healthy machine."""
+    prior = plain_prior(tuning)
+    case = bench.case
+    first = len(case.training) + len(case.holdout)
+    if not case.healthy:
+        return prior
+    tell("calibrating on the healthy machine")
+    healthy = range(first, first + len(case.healthy))[: bench.settings.most_records]
+    return calibrated(bench.workbench(healthy, len(healthy), bench.search), prior)
+
+
+def _conditions(content: Content) -> tuple[float, float, float]:
+    """Speed, load and radial force under which a model runs."""
+    point = content.get("operating_point", {})
+    force = content.get("parameters", {}).get("radial_load", {})
+    speed, load = point.get("speed", {}), point.get("load", {})
+    return _number(speed), _number(load), _number(force)
+
+
+def _number(entry: Any) -> float:
+    return float(entry["value"]) if isinstance(entry, dict) and "value" in entry else 0.0
 
 
 def _seconds(case: Case, settings: Settings) -> float:

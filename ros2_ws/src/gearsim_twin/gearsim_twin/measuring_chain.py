@@ -15,7 +15,7 @@ import numpy as np
 from gearsim_twin.compare.chains import ChannelNuisance, Nuisance, apply
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan
-from gearsim_twin.compare.nuisances import Limits, fit_nuisances
+from gearsim_twin.compare.nuisances import Limits, fit_several
 from gearsim_twin.stack import Assumed
 
 __all__ = ["MeasuringChain", "measuring_chain"]
@@ -57,18 +57,16 @@ class MeasuringChain:
         and bandwidth as the levels want them, and one with a floor alone. The former may make up for what a
         model lacks altogether by a gain that no sensor has.
         """
-        free = fit_nuisances(pairs, self.limits)
-        stiff = fit_nuisances(pairs, Limits(gain_std_db=_STIFF_DB))
-        chains: list[ChannelNuisance] = []
-        corrections: list[float] = []
-        for channel in self.channels:
-            plain = replace(stiff.of(channel), gain_db=0.0, corner_hz=math.inf)
-            rivals = [(chain, self._needs(chain, pairs)) for chain in (free.of(channel), plain)]
-            chain, needs = min(rivals, key=lambda rival: self._cost(rival[0], rival[1], pairs))
-            chains.append(chain)
-            corrections += needs
+        free, stiff = fit_several(pairs, (self.limits, Limits(gain_std_db=_STIFF_DB)))
+        bare = tuple(replace(stiff.of(name), gain_db=0.0, corner_hz=math.inf) for name in self.channels)
+        rivals = (Nuisance(tuple(free.of(name) for name in self.channels)), Nuisance(bare))
+        needs = [[self._needs(chain, pairs) for chain in rival.channels] for rival in rivals]
+        costs = [self._costs(rival, each, pairs) for rival, each in zip(rivals, needs, strict=True)]
+        best = [int(costs[1][k] < costs[0][k]) for k in range(len(self.channels))]
+        chains = tuple(rivals[which].channels[k] for k, which in enumerate(best))
+        corrections = tuple(need for k, which in enumerate(best) for need in needs[which][k])
         rest = tuple(chain for chain in free.channels if chain.channel not in self.channels)
-        return Nuisance((*chains, *rest)), tuple(corrections)
+        return Nuisance((*chains, *rest)), corrections
 
     def _needs(self, chain: ChannelNuisance, pairs: Sequence[tuple[Features, Features]]) -> tuple[float, ...]:
         """Gain, loss at the top and colour of the floor that a chain has, dB."""
@@ -76,20 +74,25 @@ class MeasuringChain:
         needs = (chain.gain_db, loss, _colour_db(chain, [simulated for _, simulated in pairs]))
         return tuple(float(np.clip(each, -_MOST_DB, _MOST_DB)) for each in needs)
 
-    def _cost(
+    def _costs(
         self,
-        chain: ChannelNuisance,
-        needs: tuple[float, ...],
+        rival: Nuisance,
+        needs: Sequence[tuple[float, ...]],
         pairs: Sequence[tuple[Features, Features]],
-    ) -> float:
-        """Minus log likelihood of the differences that it leaves, and of what it needs, in nats."""
-        stds = [each.std_db for each in self.assumed if each.channel == chain.channel]
-        cost = 0.5 * sum((need / std) ** 2 for need, std in zip(needs, stds, strict=True))
+    ) -> list[float]:
+        """Minus log likelihood of the differences left in each channel, and of what it needs, in nats."""
+        stds = [[each.std_db for each in self.assumed if each.channel == name] for name in self.channels]
+        costs = [
+            0.5 * sum((need / std) ** 2 for need, std in zip(own, known, strict=True))
+            for own, known in zip(needs, stds, strict=True)
+        ]
         for measured, simulated in pairs:
-            mine = np.array([place.channel == chain.channel for place in measured.places])
-            compared = compare(measured.where(mine), apply(Nuisance((chain,)), simulated.where(mine)))
-            cost -= _SHARE * compared.loglike
-        return cost
+            compared = compare(measured, apply(rival, simulated))
+            density = compared.densities()
+            channel = np.array([place.channel for place in measured.places])
+            for k, name in enumerate(self.channels):
+                costs[k] -= _SHARE * float(density[channel == name].sum())
+        return costs
 
     def apply(self, nuisance: tuple[Nuisance, tuple[float, ...]], simulated: Features) -> Features:
         """Simulated features as the chain would show them."""

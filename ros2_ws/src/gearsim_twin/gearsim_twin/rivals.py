@@ -15,6 +15,8 @@ __all__ = ["alternatives", "decided_by", "rejected"]
 LEAST_PROBABILITY = 0.1
 """Of a rival in place of a cause that was taken, for it to be told among the causes."""
 
+_UNTRIED = "not tried: others looked more hopeful, and all simulations that a case may cost were spent"
+
 
 def alternatives(choice: Choice, selection: Selection) -> tuple[Found, ...]:
     """Causes that the records cannot tell from one that was taken, with what would."""
@@ -82,6 +84,9 @@ def rejected(selection: Selection, told: set[str], settings: Settings | None = N
             if name not in names and name not in found:
                 component = guess.extension.words.get("component", "")
                 found[name] = Rejected(name, component, _left(guess.nats), None, 0.0)
+        for name in each.untried:
+            if name not in names and name not in found:
+                found[name] = Rejected(name, "", _UNTRIED, None, 0.0)
     return tuple(sorted(found.values(), key=lambda entry: -entry.probability))
 
 

@@ -6,7 +6,7 @@ guess added. So one simulation tells how well the cause would do at any strength
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,9 @@ from gearsim_twin.workbench import Trial, Workbench
 
 __all__ = ["Screened", "first_guesses", "most_hopeful", "screen"]
 
+_AT_ONCE = 8
+# A guess that did so much worse than nothing is not tried again in the next round.
+_NO_USE_NATS = 5.0
 _STRENGTHS = 2.0 ** np.arange(-5, 6)
 
 
@@ -59,11 +62,12 @@ def first_guesses(causes: tuple[Cause, ...], context: Context) -> list[tuple[Ext
 
 
 def most_hopeful(
-    guesses: list[tuple[Extension, int]], earlier: Mapping[tuple[str, str], float], most: int
+    guesses: list[tuple[Extension, int]], earlier: Mapping[tuple[str, str], float]
 ) -> list[tuple[Extension, int]]:
-    """So many of the guesses: new ones first, then those that did best in the round before.
+    """The guesses, new ones first, then those that did best in the round before.
 
-    Of equal ones each cause's first guess comes before any second one.
+    Of equal ones each cause's first guess comes before any second one. Those that have done far worse than
+    nothing before are left out.
     """
     rank: dict[str, int] = {}
     order = []
@@ -71,23 +75,34 @@ def most_hopeful(
         place = rank.setdefault(extension.cause.name, 0)
         rank[extension.cause.name] += 1
         order.append((-earlier.get(extension.key, np.inf), place))
-    kept = sorted(range(len(guesses)), key=lambda k: order[k])[:most]
-    return [guesses[k] for k in sorted(kept)]
+    ranked = sorted(range(len(guesses)), key=lambda k: order[k])
+    return [guesses[k] for k in ranked if order[k][0] < _NO_USE_NATS]
 
 
 def screen(
-    bench: Workbench, yard: Yardstick, base: Fitted, guesses: list[tuple[Extension, int]]
+    bench: Workbench,
+    yard: Yardstick,
+    base: Fitted,
+    guesses: list[tuple[Extension, int]],
+    enough: Callable[[], bool] = lambda: False,
 ) -> list[Screened]:
-    """All guesses by how much better than the base they do, best first; one per cause and component."""
-    trials = bench.trials([base.trial.model.extended(extension) for extension, _ in guesses])
+    """All guesses by how much better than the base they do, best first; one per cause and component.
+
+    They are simulated some at a time, until `enough` says that no further one may be.
+    """
     before = yard.value(base.trial.levels, base.at)
     best: dict[tuple[str, str], Screened] = {}
-    for trial, (extension, count) in zip(trials, guesses, strict=True):
-        cost = extension.reading_nats
-        found = Screened(trial, _best_value(yard, base, trial) - before - cost, count)
-        known = best.get(extension.key)
-        if known is None or known.nats < found.nats:
-            best[extension.key] = found
+    for start in range(0, len(guesses), _AT_ONCE):
+        if enough():
+            break
+        some = guesses[start : start + _AT_ONCE]
+        trials = bench.trials([base.trial.model.extended(extension) for extension, _ in some])
+        for trial, (extension, count) in zip(trials, some, strict=True):
+            value = -np.inf if trial.refused else _best_value(yard, base, trial)
+            found = Screened(trial, float(value) - before - extension.reading_nats, count)
+            known = best.get(extension.key)
+            if known is None or known.nats < found.nats:
+                best[extension.key] = found
     return sorted(best.values(), key=lambda each: -each.nats)
 
 

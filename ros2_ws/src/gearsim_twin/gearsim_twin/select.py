@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from gearsim_twin.causes.cause import Cause
 from gearsim_twin.causes.context import Context
 from gearsim_twin.choices import Candidate, Choice, Round
-from gearsim_twin.fit import Fitted, fit, judged
+from gearsim_twin.contest import contest
+from gearsim_twin.fit import Fitted, judged
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.needed import gain_between, needed, settled
 from gearsim_twin.screen import Screened, first_guesses, most_hopeful, screen
@@ -59,6 +60,10 @@ class _Search:
     settings: Settings
     tell: Callable[[str], None]
 
+    def spent(self) -> bool:
+        """Whether the search has cost what it may."""
+        return self.bench.simulations >= self.settings.most_simulations
+
 
 def select(
     bench: Workbench,
@@ -68,6 +73,7 @@ def select(
     context_of: Callable[[Trial], Context],
     settings: Settings,
     tell: Callable[[str], None] = lambda _: None,
+    content: Callable[[Context], bool] = lambda _: False,
 ) -> Selection:
     """Causes that explain what the tuned model misses.
 
@@ -84,6 +90,8 @@ def select(
     settings : Settings
     tell : callable
         Gets a line on what is being done.
+    content : callable
+        Whether nothing of note is left to be explained: then no further cause is looked for.
     """
     search = _Search(bench, causes, context_of, settings, tell)
     current = tuned
@@ -92,7 +100,12 @@ def select(
     certain = (yard, tuned, choices)
     tentative = False
     while len(choices) < settings.most_causes:
-        done, yard, current = _round(search, yard, current, {choice.key for choice in choices}, rounds)
+        context = context_of(current.trial)
+        if choices and content(context):
+            break
+        done, yard, current = _round(
+            search, yard, current, {choice.key for choice in choices}, rounds, context
+        )
         rounds.append(done)
         if done.taken is not None:
             number = done.taken
@@ -107,14 +120,20 @@ def select(
         if not tentative:
             current, choices = needed(bench, yard, settings, current, choices)
             certain = (yard, current, choices)
+        if search.spent():
+            break
     yard, current, choices = certain
     return Selection(tuned, current, tuple(choices), tuple(rounds), yard)
 
 
 def _round(
-    search: _Search, yard: Yardstick, current: Fitted, taken: set[tuple[str, str]], rounds: list[Round]
+    search: _Search,
+    yard: Yardstick,
+    current: Fitted,
+    taken: set[tuple[str, str]],
+    rounds: list[Round],
+    context: Context,
 ) -> tuple[Round, Yardstick, Fitted]:
-    context = search.context_of(current.trial)
     guesses = [
         (extension, count)
         for extension, count in first_guesses(search.causes, context)
@@ -122,20 +141,23 @@ def _round(
     ]
     names = len({extension.cause.name for extension, _ in guesses})
     earlier = {each.extension.key: each.nats for each in rounds[-1].left} if rounds else {}
-    guesses = most_hopeful(guesses, earlier, search.settings.most_guesses // (2 if rounds else 1))
-    search.tell(f"trying {len(guesses)} first guesses")
-    screened = screen(search.bench, yard, current, guesses)
+    ranked = most_hopeful(guesses, earlier)
+    kept = ranked[: search.settings.most_guesses // (2 if rounds else 1)]
+    search.tell(f"trying {len(kept)} first guesses")
+    screened = screen(search.bench, yard, current, kept, search.spent)
     chosen = _worth_fitting(screened, search.settings)
-    fits: list[tuple[Fitted, int]] = []
-    for each in chosen:
-        search.tell(f"fitting {each.extension.cause.name}")
-        best = max([found.evidence for found, _ in fits], default=-math.inf)
-        fits.append((fit(search.bench, yard, each.trial, current.slopes, best), each.guesses))
+    if chosen:
+        search.tell("fitting " + ", ".join(dict.fromkeys(each.extension.cause.name for each in chosen)))
+    trials = [each.trial for each in chosen]
+    found = contest(search.bench, yard, trials, current.slopes, search.spent) if trials else []
+    fits = [(fitted, each.guesses) for fitted, each in zip(found, chosen, strict=True)]
     yard, current, fits = _same_measure(yard, current, fits)
     candidates = _probable(search.settings, current, fits, names)
     candidates, accepted = _held_out(search, yard, current, candidates, len(rounds))
     left = tuple(each for each in screened if each not in chosen)
-    return Round(tuple(candidates), left, accepted), yard, current
+    seen = {each.extension.cause.name for each in screened}
+    untried = tuple(dict.fromkeys(one.cause.name for one, _ in ranked if one.cause.name not in seen))
+    return Round(tuple(candidates), left, accepted, untried), yard, current
 
 
 def _worth_fitting(screened: list[Screened], settings: Settings) -> list[Screened]:

@@ -20,6 +20,13 @@ class Settings:
         Causes that are fitted in a round, those that the best one may be confused with not counted.
     most_guesses : int
         First guesses that are simulated in the first round; half as many in later ones.
+    most_simulations : int
+        Simulations of a record that a search may cost; what is not tried for that is told. Counted, not
+        timed, so that a verdict does not depend on how busy the computer is.
+    most_channels : int
+        Channels that the search looks at, those that differ most; all count in the final scores.
+    most_records : int
+        Records for training that the search looks at, those under the most different conditions.
     worth_fitting_nats : float
         Better log likelihood at the first guess, below which no fit is tried.
     another : float
@@ -34,7 +41,7 @@ class Settings:
     seeds : int
         Machines of a kind that are simulated to learn what chance does.
     most_seconds : float
-        Longest simulation; beyond, it is no longer what limits the comparison.
+        Longest simulation, unless lines of the machine need longer to be told apart.
     seed : int
         Of simulations and of the intervals of held-out gains.
     workers : int
@@ -43,14 +50,17 @@ class Settings:
 
     most_causes: int = 3
     fits: int = 4
-    most_guesses: int = 40
+    most_guesses: int = 32
+    most_simulations: int = 160
+    most_channels: int = 3
+    most_records: int = 3
     worth_fitting_nats: float = 1.0
     another: float = 0.3
     doubt: float = 0.05
     hint_nats: float = -2.5
     trifle_db: float = 0.02
     seeds: int = 4
-    most_seconds: float = 5.0
+    most_seconds: float = 3.0
     seed: int = 1
     workers: int = 1
 

@@ -126,6 +126,33 @@ class Simulator:
         """
         return self._made([self._task(number, content, seconds, seed) for number, content in jobs], then)
 
+    def tried(
+        self,
+        jobs: Sequence[tuple[int, Content]],
+        then: Callable[[View], T],
+        seconds: float | None = None,
+        seed: int = 1,
+    ) -> list[T | None]:
+        """As `derived`, with None in place of what the simulator refuses."""
+        tasks = [self._task(number, content, seconds, seed) for number, content in jobs]
+        return self._made(tasks, then, refused=True)
+
+    def seeded(
+        self,
+        jobs: Sequence[tuple[int, Content, int]],
+        then: Callable[[View], T],
+        seconds: float | None = None,
+    ) -> list[T]:
+        """As `derived`, each job with a seed of its own."""
+        tasks = [self._task(number, content, seconds, seed) for number, content, seed in jobs]
+        return self._made(tasks, then)
+
+    def prepare(self) -> None:
+        """Let the processes load their libraries, while this one does something else."""
+        if self._workers > 1 and self._pool is None:
+            self._pool = Workers(self._workers)
+            self._pool.wake()
+
     def _task(self, number: int, content: Content, seconds: float | None, seed: int) -> _Task:
         view = self.measured[number]
         length = view.record.seconds if seconds is None else seconds
@@ -134,11 +161,12 @@ class Simulator:
         shaft = view.machine.reference_shaft if view.machine.reference_shaft in shafts else shafts[0]
         return _Task(own, length, view.machine, view.speed, shaft)
 
-    def _made(self, tasks: Sequence[_Task], then: Callable[[View], T]) -> list[T]:
+    def _made(self, tasks: Sequence[_Task], then: Callable[[View], T], refused: bool = False) -> list[Any]:
+        """What is made of the views; with `refused` None where the simulator takes no such content."""
         if self._workers > 1 and len(tasks) > 1:
             try:
                 self._pool = self._pool or Workers(self._workers)
-                return self._pool.map(_done, [(task, then) for task in tasks])
+                return self._pool.map(_tried if refused else _done, [(task, then) for task in tasks])
             except WorkerLostError:
                 # A process was killed from outside; what it can do this one can, one after the other.
                 self.close()
@@ -146,7 +174,15 @@ class Simulator:
             except BaseException:
                 self.close()
                 raise
-        return [then(self._view(task)) for task in tasks]
+        return [self._here(task, then, refused) for task in tasks]
+
+    def _here(self, task: _Task, then: Callable[[View], T], refused: bool) -> T | None:
+        try:
+            return then(self._view(task))
+        except InputError:
+            if refused:
+                return None
+            raise
 
     def _view(self, task: _Task) -> View:
         view = self._kept[task.key] if task.key in self._kept else task.view()
@@ -225,6 +261,14 @@ def _done(work: tuple[_Task, Callable[[View], T]]) -> T:
     check_stop()
     task, then = work
     return then(task.view())
+
+
+def _tried(work: tuple[_Task, Callable[[View], T]]) -> T | None:
+    """The same, and None for what the simulator refuses."""
+    try:
+        return _done(work)
+    except InputError:
+        return None
 
 
 def _itself(view: View) -> View:

@@ -84,6 +84,10 @@ class Workbench:
     nuisances : Nuisances
     chance : mapping of int to Realisations
         Of some records, what chance does to their levels.
+    numbers : tuple of int
+        Which records of the case they are.
+    simulations : int
+        Of a record, so far.
     """
 
     measured: tuple[Features, ...]
@@ -92,6 +96,7 @@ class Workbench:
     run: Callable[[Sequence[Job]], Sequence[Features | None]]
     nuisances: Nuisances
     chance: Mapping[int, Realisations] = field(default_factory=dict)
+    numbers: tuple[int, ...] = ()
     simulations: int = 0
     _known: dict[str, Features | None] = field(default_factory=dict)
     _stack: Stack | None = None

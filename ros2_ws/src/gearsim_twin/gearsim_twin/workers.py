@@ -51,6 +51,7 @@ class Workers:
 
     def __init__(self, count: int) -> None:
         self._context = _Remembering()
+        self._count = count
         self._stop = self._context.Event()
         self._executor = ProcessPoolExecutor(count, self._context, _begin, (self._stop,))
 
@@ -67,6 +68,11 @@ class Workers:
             return [future.result() for future in futures]
         except BrokenProcessPool as error:
             raise WorkerLostError(str(error)) from error
+
+    def wake(self) -> None:
+        """Start all processes now."""
+        for _ in range(self._count):
+            self._executor.submit(_load)
 
     def close(self) -> None:
         """End all processes; what they work at is given up."""
@@ -109,6 +115,11 @@ class _Remembering(SpawnContext):
         for process in self._started:
             if process.is_alive():
                 process.terminate()
+
+
+def _load() -> None:
+    """In a worker: load what simulations need."""
+    import gearsim_twin.compare.features  # noqa: F401
 
 
 def _begin(flag: Any) -> None:

@@ -64,6 +64,10 @@ class Comparison:
     by_domain: Mapping[str, DomainDifference]
     speed_hz: float
 
+    def densities(self) -> NDArray[np.float64]:
+        """Log density of each place, shape (n,); 0 where it does not count."""
+        return _densities(self.z, self.std_db, self.counted)
+
 
 def compare(measured: Features, simulated: Features, tau_db: Mapping[str, float] | None = None) -> Comparison:
     """Compare two records at their places.
@@ -107,8 +111,7 @@ def _comparison(
     counted: NDArray[np.bool_],
     speed_hz: float,
 ) -> Comparison:
-    safe = np.where(counted, std, 1.0)
-    density = np.where(counted, _T_CONST - np.log(safe) - 0.5 * (NU + 1) * np.log1p(z**2 / NU), 0.0)
+    density = _densities(z, std, counted)
     domain = np.array([place.domain for place in places])
     by_domain: dict[str, DomainDifference] = {}
     for name in DOMAINS:
@@ -117,6 +120,13 @@ def _comparison(
             rms = float(np.sqrt(np.mean(difference[rows] ** 2)))
             by_domain[name] = DomainDifference(int(rows.sum()), rms, float(density[rows].sum()))
     return Comparison(places, difference, z, std, counted, float(density.sum()), by_domain, speed_hz)
+
+
+def _densities(
+    z: NDArray[np.float64], std: NDArray[np.float64], counted: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    safe = np.where(counted, std, 1.0)
+    return np.where(counted, _T_CONST - np.log(safe) - 0.5 * (NU + 1) * np.log1p(z**2 / NU), 0.0)
 
 
 def _scale(place: Place) -> float:

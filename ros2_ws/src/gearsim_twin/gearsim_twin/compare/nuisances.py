@@ -13,18 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from gearsim_io.errors import InputError
+from gearsim_twin.compare.chain_fits import KNOTS, ChainData, solve, stacked
 from gearsim_twin.compare.chains import ChannelNuisance, Nuisance, apply
 from gearsim_twin.compare.features import Features
 from gearsim_twin.compare.places import Place
 
-__all__ = ["ChannelNuisance", "Limits", "Nuisance", "apply", "fit_nuisance", "fit_nuisances"]
+__all__ = ["ChannelNuisance", "Limits", "Nuisance", "apply", "fit_nuisance", "fit_nuisances", "fit_several"]
 
 Vector = NDArray[np.float64]
 
-_KNOTS = 5
 _TINY = 1e-300
 # What a model that is nearly right still misses at a band and at a line, for the weights of the fit alone.
 _BAND_TAU_DB, _LINE_TAU_DB = 1.0, 2.0
@@ -67,148 +66,176 @@ def fit_nuisances(pairs: Sequence[tuple[Features, Features]], limits: Limits | N
     for measured, simulated in pairs:
         if measured.places != simulated.places:
             raise InputError("fit_nuisances", "places", "different ones", "the same on both sides")
-    chosen = limits or Limits()
-    names = dict.fromkeys(place.channel for place in pairs[0][0].places)
-    fitted = [_Fit.of(name, pairs, chosen) for name in names]
-    return Nuisance(tuple(fit.solve() for fit in fitted if fit is not None))
+    return fit_several(pairs, [limits or Limits()])[0]
+
+
+def fit_several(pairs: Sequence[tuple[Features, Features]], limits: Sequence[Limits]) -> tuple[Nuisance, ...]:
+    """As `fit_nuisances`, with several beliefs at one go."""
+    levels = _Levels.of(pairs)
+    problems = [
+        problem
+        for number, each in enumerate(limits)
+        for channel in levels.channels
+        for problem in levels.problems(channel, each, number)
+    ]
+    found: list[dict[str, tuple[float, ChannelNuisance]]] = [{} for _ in limits]
+    if problems:
+        ends, costs = solve(
+            stacked([one.data for one in problems]), np.stack([one.start for one in problems])
+        )
+        for problem, x, cost in zip(problems, ends, costs.tolist(), strict=True):
+            best = found[problem.limits].get(problem.channel)
+            if best is None or cost < best[0]:
+                found[problem.limits][problem.channel] = (cost, problem.chain(x))
+    return tuple(Nuisance(tuple(chain for _, chain in each.values())) for each in found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
-    """The least squares of one channel: bands and lines of all records."""
+class _Problem:
+    """The chain of one channel, from one start."""
 
     channel: str
+    limits: int
+    data: ChainData
+    start: Vector
+    knots_hz: Vector
+    top_hz: float
+    has_gain: bool
+
+    def chain(self, x: Vector) -> ChannelNuisance:
+        """The chain at some unknowns."""
+        corner = math.exp(x[-1]) * self.top_hz
+        # A corner that takes less than 0.05 dB anywhere is none.
+        corner = math.inf if x[-1] > math.log(3.0) or not self.has_gain else corner
+        count = self.knots_hz.size
+        knots, floor = tuple(self.knots_hz.tolist()), tuple(x[1 : 1 + count].tolist())
+        return ChannelNuisance(self.channel, float(x[0]) if self.has_gain else 0.0, knots, floor, corner)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Levels:
+    """Bands and lines of all records that chains are fitted to; all arrays of shape (n,)."""
+
+    channel: NDArray[np.str_]
     measured_db: Vector
     simulated: Vector
     weight: Vector
     hz: Vector
     width: Vector
     is_band: NDArray[np.bool_]
-    knots_hz: Vector
-    gain_std_db: float
+    turning: frozenset[str]
 
     @classmethod
-    def of(cls, channel: str, pairs: Sequence[tuple[Features, Features]], limits: Limits) -> _Fit | None:
-        rows = []
+    def of(cls, pairs: Sequence[tuple[Features, Features]]) -> _Levels:
+        places = pairs[0][0].places
+        fitted = np.array([_is_fitted(place) for place in places], dtype=np.bool_)
+        quiet = np.array([place.kind in ("band", "floor") for place in places], dtype=np.bool_)
+        channel = np.array([place.channel for place in places])
+        tau = np.where(quiet, _BAND_TAU_DB, _LINE_TAU_DB)
+        parts: list[tuple[NDArray[np.intp], Vector, Vector, Vector, Vector, Vector]] = []
         for measured, simulated in pairs:
             m, s = measured.levels, simulated.levels
-            clear = measured.stands_out | simulated.stands_out
-            known = np.isfinite(m.level_db) & np.isfinite(s.level_db) & np.isfinite(m.frequency_hz)
-            for k, place in enumerate(measured.places):
-                if place.channel == channel and known[k] and clear[k] and _is_fitted(place):
-                    quiet = place.kind in ("band", "floor")
-                    tau = _BAND_TAU_DB if quiet else _LINE_TAU_DB
-                    sigma = math.hypot(m.std_db[k], s.std_db[k], tau)
-                    power = 10 ** (0.1 * s.level_db[k])
-                    rows.append(
-                        (m.level_db[k], power, 1 / sigma, m.frequency_hz[k], m.bandwidth_hz[k], quiet)
-                    )
-        if len(rows) < _FEWEST_PLACES:
-            return None
-        level, power, weight, hz, width, band = (np.array(column) for column in zip(*rows, strict=True))
-        is_band = np.asarray(band, dtype=np.bool_)
-        turning = all(p.domain == "torsional" for p in pairs[0][0].places if p.channel == channel)
-        bands = hz[is_band]
-        knots = np.array([1.0]) if turning or bands.size < _KNOTS else np.geomspace(*_ends(bands), _KNOTS)
-        gain_std = 0.0 if turning else limits.gain_std_db
-        return cls(channel, level, power, weight, hz, width, is_band, knots, gain_std)
+            use = fitted & (measured.stands_out | simulated.stands_out)
+            use &= np.isfinite(m.level_db) & np.isfinite(s.level_db) & np.isfinite(m.frequency_hz)
+            rows = np.flatnonzero(use)
+            sigma = np.sqrt(m.std_db[rows] ** 2 + s.std_db[rows] ** 2 + tau[rows] ** 2)
+            power = 10 ** (0.1 * s.level_db[rows])
+            hz, width = m.frequency_hz[rows], m.bandwidth_hz[rows]
+            parts.append((rows, m.level_db[rows], power, 1 / sigma, hz, width))
+        index = np.concatenate([part[0] for part in parts])
+        level, power, weight, hz, width = (
+            np.concatenate([np.asarray(part[k], dtype=np.float64) for part in parts]) for k in range(1, 6)
+        )
+        others = {place.channel for place in places if place.domain != "torsional"}
+        turning = frozenset(place.channel for place in places) - others
+        return cls(channel[index], level, power, weight, hz, width, quiet[index], turning)
 
-    def solve(self) -> ChannelNuisance:
-        """The best chain."""
-        corners = _CORNER_STARTS if self.gain_std_db else _CORNER_STARTS[:1]
-        starts = itertools.product(self._first_gains(), corners)
-        best = min((self._from(gain, corner) for gain, corner in starts), key=lambda found: found[0])[1]
-        return self._chain(best)
+    @property
+    def channels(self) -> list[str]:
+        """Those that have levels enough, in their order."""
+        names, counts = np.unique(self.channel, return_counts=True)
+        enough = set(names[counts >= _FEWEST_PLACES].tolist())
+        return [name for name in dict.fromkeys(self.channel.tolist()) if name in enough]
 
-    def _first_gains(self) -> list[float]:
-        if self.gain_std_db == 0:
+    def problems(self, channel: str, limits: Limits, number: int) -> list[_Problem]:
+        """What is to be solved for a channel: from two gains and two corners."""
+        mine = self.channel == channel
+        part = _Levels(
+            self.channel[mine],
+            self.measured_db[mine],
+            self.simulated[mine],
+            self.weight[mine],
+            self.hz[mine],
+            self.width[mine],
+            self.is_band[mine],
+            self.turning,
+        )
+        gain_std = 0.0 if channel in self.turning else limits.gain_std_db
+        bands = part.hz[part.is_band]
+        plain = channel in self.turning or bands.size < KNOTS
+        knots = np.array([1.0]) if plain else np.geomspace(bands.min(), bands.max(), KNOTS)
+        corners = _CORNER_STARTS if gain_std else _CORNER_STARTS[:1]
+        found = []
+        for gain, corner in itertools.product(part.first_gains(gain_std), corners):
+            low, floor = part.first_floor(gain, knots)
+            data = part.data(knots, gain_std, low)
+            start = np.concatenate(([gain], floor, np.zeros(KNOTS - knots.size), [corner]))
+            top = float(part.hz.max())
+            found.append(_Problem(channel, number, data, start, knots, top, bool(gain_std)))
+        return found
+
+    def first_gains(self, gain_std_db: float) -> list[float]:
+        """None, and the usual ratio of lines."""
+        if gain_std_db == 0:
             return [0.0]
         lines = ~self.is_band
         use = lines if lines.sum() >= _FEWEST_PLACES else np.ones_like(lines)
         ratio = self.measured_db[use] - 10 * np.log10(np.maximum(self.simulated[use], _TINY))
-        guess = float(np.clip(np.median(ratio), -4 * self.gain_std_db, 4 * self.gain_std_db))
+        guess = float(np.clip(np.median(ratio), -4 * gain_std_db, 4 * gain_std_db))
         return [0.0, guess] if abs(guess) > 1.0 else [0.0]
 
-    def _from(self, gain_db: float, corner: float) -> tuple[float, Vector]:
-        low, start = self._first_floor(gain_db)
-        x = np.concatenate(([gain_db], start, [corner]))
-        wide = 60.0 if self.gain_std_db else 1e-6
-        lower = np.concatenate(([-wide], low, [_LEAST_CORNER]))
-        upper = np.concatenate(([wide], low + 2 * _KNOT_REACH_DB, [math.log(100.0)]))
-        found = least_squares(
-            self._residuals,
-            np.clip(x, lower + 1e-9, upper - 1e-9),
-            jac=self._jacobian,
-            bounds=(lower, upper),
-            loss="cauchy",
-            f_scale=2.0,
-            x_scale=np.concatenate(([1.0], np.full(start.size, 3.0), [0.3])),
-            max_nfev=40,
-        )
-        return float(found.cost), np.asarray(found.x)
-
-    def _first_floor(self, gain_db: float) -> tuple[Vector, Vector]:
+    def first_floor(self, gain_db: float, knots_hz: Vector) -> tuple[Vector, Vector]:
         """Lowest and first value of the knots: what the measured bands near them hold more than the model."""
         density = self.measured_db - 10 * np.log10(self.width)
         model = 10 * np.log10(np.maximum(self.simulated / self.width, _TINY)) + gain_db
         bands = self.is_band if self.is_band.any() else np.ones_like(self.is_band)
         order = np.argsort(self.hz[bands])
-        hz, measured, model = self.hz[bands][order], density[bands][order], model[bands][order]
+        measured, model = density[bands][order], model[bands][order]
         first = []
-        for part in np.array_split(np.arange(hz.size), self.knots_hz.size):
+        for part in np.array_split(np.arange(order.size), knots_hz.size):
             quiet = float(np.quantile(measured[part], 0.3)) if part.size else float(measured.min())
             below = bool(part.size) and float(np.median(model[part])) < quiet - 1.0
             first.append(quiet if below else quiet - 20.0)
         floor = np.array(first)
         return np.full(floor.size, float(floor.min()) - _KNOT_REACH_DB), floor
 
-    def _chain(self, x: Vector) -> ChannelNuisance:
-        corner = math.exp(x[-1]) * float(self.hz.max())
-        # A corner that takes less than 0.05 dB anywhere is none.
-        corner = math.inf if x[-1] > math.log(3.0) else corner
-        knots, floor = tuple(self.knots_hz.tolist()), tuple(x[1:-1].tolist())
-        return ChannelNuisance(self.channel, float(x[0]) if self.gain_std_db else 0.0, knots, floor, corner)
+    def data(self, knots_hz: Vector, gain_std_db: float, low: Vector) -> ChainData:
+        """What the solver wants, as a single problem; unknowns that do not count are held at 0."""
+        count, size = knots_hz.size, self.hz.size
+        weights = np.zeros((size, KNOTS))
+        weights[:, :count] = _knot_weights(self.hz, knots_hz)
+        ratio4 = (self.hz / self.hz.max()) ** 4 if gain_std_db else np.zeros(size)
+        belief, believed = self._beliefs(count, gain_std_db)
+        wide = 60.0 if gain_std_db else 0.0
+        rest = np.zeros(KNOTS - count)
+        lower = np.concatenate(([-wide], low, rest, [_LEAST_CORNER]))
+        upper = np.concatenate(([wide], low + 2 * _KNOT_REACH_DB, rest, [math.log(100.0)]))
+        arrays = (self.measured_db, self.simulated, self.weight, ratio4, self.width, weights)
+        return ChainData(*(each[None] for each in (*arrays, belief, believed, lower, upper)))
 
-    def _parts(self, x: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-        """Power of model and floor, (f / f_c)^4, and the weights of the knots at each place."""
-        ratio4 = (self.hz / (math.exp(x[-1]) * self.hz.max())) ** 4 if self.gain_std_db else 0 * self.hz
-        model = 10 ** (0.1 * x[0]) / (1 + ratio4) * self.simulated
-        weights = _knot_weights(self.hz, self.knots_hz)
-        floor = 10 ** (0.1 * (weights @ x[1:-1])) * self.width
-        return model, floor, ratio4, weights
-
-    def _residuals(self, x: Vector) -> Vector:
-        model, floor, _, _ = self._parts(x)
-        data = self.weight * (10 * np.log10(model + floor) - self.measured_db)
-        return np.concatenate((data, self._beliefs() @ x - self._believed()))
-
-    def _jacobian(self, x: Vector) -> Vector:
-        model, floor, ratio4, weights = self._parts(x)
-        share = model / (model + floor)
-        corner = share * 10 / math.log(10) * 4 * ratio4 / (1 + ratio4)
-        slopes = np.column_stack((share, (1 - share)[:, None] * weights, corner))
-        return np.vstack((self.weight[:, None] * slopes, self._beliefs()))
-
-    def _beliefs(self) -> Vector:
+    def _beliefs(self, count: int, gain_std_db: float) -> tuple[Vector, Vector]:
         """Rows of what is believed beforehand: gain, bends and depth of the floor, corner."""
-        count = self.knots_hz.size
-        gain = np.zeros((1, count + 2))
-        gain[0, 0] = 1 / self.gain_std_db if self.gain_std_db else 1.0
-        bends = np.zeros((max(count - 2, 0), count + 2))
-        for k in range(bends.shape[0]):
-            bends[k, k + 1 : k + 4] = np.array([1.0, -2.0, 1.0]) / _KNOT_SPREAD_DB
-        depth = np.zeros((count, count + 2))
-        depth[:, 1:-1] = np.eye(count) / _KNOT_DEPTH_DB
-        corner = np.zeros((1, count + 2))
-        corner[0, -1] = 1 / _CORNER_SPREAD
-        return np.vstack((gain, bends, depth, corner))
-
-    def _believed(self) -> Vector:
-        count = self.knots_hz.size
-        out = np.zeros(1 + max(count - 2, 0) + count + 1)
-        out[-1 - count : -1] = (self._quietest() - _KNOT_REACH_DB) / _KNOT_DEPTH_DB
-        out[-1] = _USUAL_CORNER / _CORNER_SPREAD
-        return out
+        belief = np.zeros((2 * KNOTS, KNOTS + 2))
+        believed = np.zeros(2 * KNOTS)
+        belief[0, 0] = 1 / gain_std_db if gain_std_db else 0.0
+        for k in range(count - 2):
+            belief[1 + k, k + 1 : k + 4] = np.array([1.0, -2.0, 1.0]) / _KNOT_SPREAD_DB
+        for k in range(count):
+            belief[KNOTS - 1 + k, 1 + k] = 1 / _KNOT_DEPTH_DB
+            believed[KNOTS - 1 + k] = (self._quietest() - _KNOT_REACH_DB) / _KNOT_DEPTH_DB
+        belief[-1, -1] = 1 / _CORNER_SPREAD
+        believed[-1] = _USUAL_CORNER / _CORNER_SPREAD
+        return belief, believed
 
     def _quietest(self) -> float:
         """Least density measured."""
@@ -219,10 +246,6 @@ class _Fit:
 def _is_fitted(place: Place) -> bool:
     """Bands and lines; tones are no business of the chain."""
     return place.domain in ("psd", "orders", "torsional") and place.kind != "tone"
-
-
-def _ends(values: Vector) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
 
 
 def _knot_weights(hz: Vector, knots_hz: Vector) -> Vector:
