@@ -32,6 +32,7 @@ def files(tmp_path):
     plate = "name: plate\nnameplate: {reference_shaft: shaft, shafts: {shaft: {}}}\n"
     (tmp_path / "plate.yaml").write_text(plate)
     (tmp_path / "taken").mkdir()
+    (tmp_path / "a.csv").write_text("a\n" + "1\n2\n3\n" * 50)
     return tmp_path
 
 
@@ -61,6 +62,14 @@ def files(tmp_path):
         ),
         ("ensemble {0}/key.yaml --seconds 1 --out {0}/taken", "taken: got a folder that exists already"),
         ("diagnose {0}/nothing", "got nothing there"),
+        (
+            "diagnose {0}/nothing --speed 30furlong",
+            "got 30furlong, expected a speed above 0 in Hz, or with",
+        ),
+        (
+            "diagnose {0}/a.csv --machine mfpt --rate 1000 --unit g --column a --speed 1500",
+            "--speed: got 1500 Hz, expected 2.5 to 250 Hz, about the nameplate's 25 Hz; 1500 rpm are 25 Hz",
+        ),
         ("twin {0}/nothing --machine mfpt --model bearing5", "got nothing there"),
         ("twin {0}/taken --machine mfpt --model bearin5", "did you mean bearing5?"),
         ("twin {0}/taken --machine {0}/plate.yaml --model lpm34", "nothing can be simulated (docs/rigs.md"),

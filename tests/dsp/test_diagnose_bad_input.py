@@ -8,7 +8,7 @@ from bearing_signals import defect, machine, noise, turns_of
 
 from gearsim_dsp.diagnose import Diagnosis, DiagnosisSettings, diagnose_record
 from gearsim_io.errors import InputError
-from gearsim_io.nameplate import Machine
+from gearsim_io.nameplate import Machine, Shaft
 from gearsim_io.record import PulseTrain, Record
 
 RATE = 12_000.0
@@ -182,3 +182,55 @@ def test_a_nameplate_four_per_cent_off_is_told_and_the_fault_still_named():
     assert diagnosis.speed.value_hz == pytest.approx(24.0, rel=1e-3)
     assert "speed_off_nameplate" in _kinds(diagnosis)
     assert [f.fault for f in diagnosis.findings] == ["outer_race"]
+
+
+def test_a_record_of_hardly_a_moment_is_told_how_long_it_must_be():
+    x, _ = _faulty()
+    diagnosis = diagnose_record(_record(x[:100]), machine())
+    (issue,) = [q for q in diagnosis.quality if q.issue == "too_short"]
+    assert issue.detail == "100 samples, 0.0083 s; at least 0.32 s (8 turns at 25 Hz) are needed"
+    assert "nothing could be judged: 0.0083 s are too short; at least 0.32 s" in diagnosis.lines()[-1]
+
+
+def test_a_given_speed_is_not_called_the_nameplates():
+    x, _ = _faulty()
+    notes = {"speed_hz": "26", "speed from": "given", "speed on the nameplate": "25 Hz"}
+    record = replace(_record(noise(np.random.default_rng(6), x.size)), notes=notes)
+    diagnosis = diagnose_record(record, machine())
+    details = {issue.issue: issue.detail for issue in diagnosis.quality}
+    assert details["speed_not_measured"].startswith("the 26 Hz given +- 2 % is taken")
+    assert details["speed_off_nameplate"] == "the 26 Hz given are +4 % off the nameplate's 25 Hz"
+    assert diagnosis.lines()[0] == "speed: 26.000 Hz +- 2 % (as given, not measured)"
+    assert diagnosis.to_json()["speed_hz"]["source"] == "nameplate"  # as the contract has it
+
+
+def test_percents_have_no_exponent():
+    x, turns = _faulty(speed=62.0)
+    pulses = np.interp(np.arange(1, turns[-1]), turns, np.arange(turns.size))
+    diagnosis = diagnose_record(_record(x, tachos=(PulseTrain("shaft", 1.0, pulses),)), machine(tacho=True))
+    (off,) = [q.detail for q in diagnosis.quality if q.issue == "speed_off_nameplate"]
+    assert off == "62 Hz is +150 % off the nameplate's 25 Hz"
+
+
+@pytest.mark.parametrize(("seconds", "judged"), [(10.0, True), (3.0, False)])
+def test_windows_of_a_slow_machine_are_long_enough_and_what_stays_unjudged_is_named(seconds, judged):
+    """At 2 Hz eight turns take 4 s; a shorter record cannot tell of bearings, which says nothing of gears."""
+    turns = turns_of(2.0, seconds, RATE)
+    x = noise(np.random.default_rng(7), turns.size)
+    pulses = np.interp(np.arange(1, turns[-1]), turns, np.arange(turns.size))
+    slow = machine(2.0, tacho=True)
+    fast_bearings = replace(
+        slow,
+        shafts=(*slow.shafts, Shaft("fast", 5.0, 10.0)),
+        bearings=tuple(replace(bearing, shaft="fast") for bearing in slow.bearings),
+    )
+    diagnosis = diagnose_record(_record(x, tachos=(PulseTrain("shaft", 1.0, pulses),)), fast_bearings)
+    short = [q.detail for q in diagnosis.quality if q.issue == "too_short"]
+    assert ("bearings" in diagnosis.judged_parts) == judged
+    assert diagnosis.speed.source == "tacho"
+    if judged:
+        assert short == []
+    else:
+        (detail,) = short
+        assert "bearings cannot be judged by 6.0 turns" in detail
+        assert "at least 8 are needed (4 s at 2 Hz)" in detail

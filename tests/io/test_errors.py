@@ -1,13 +1,16 @@
 """Errors speak to the person who wrote the file: names, places, units, and where YAML ends to be YAML."""
 
 import math
+from typing import Annotated
 
+import numpy as np
 import pytest
 from pydantic import Field
 
 from gearsim_io.errors import InputError
+from gearsim_io.numbers import number, plural
 from gearsim_io.places import place_in
-from gearsim_io.quantities import Strict, load_yaml, read_yaml, validate
+from gearsim_io.quantities import Si, Strict, load_yaml, read_yaml, validate
 
 
 @pytest.mark.parametrize(
@@ -99,3 +102,70 @@ def test_what_is_no_yaml_is_told_in_one_line_with_its_place(tmp_path, text, mess
 )
 def test_a_value_is_told_in_the_unit_of_its_bound(field, value, expected, shown):
     assert str(InputError("x", field, value, expected)) == f"x: {field}: got {shown}, expected {expected}"
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (150.0, 2, "150"),
+        (1234.0, 2, "1200"),
+        (0.1 + 0.2, 9, "0.3"),
+        (65536.0, 3, "65500"),
+        (1e5, 9, "100000"),
+        (2.5e7, 3, "2.5e+07"),
+        (1.26e-5, 2, "1.3e-05"),
+        (0.00012345, 3, "0.000123"),
+        (-0.0, 3, "-0"),
+        (math.nan, 3, "nan"),
+    ],
+)
+def test_numbers_have_no_exponent_where_people_use_none(value, digits, text):
+    assert number(value, digits) == text
+
+
+def test_numbers_with_their_sign():
+    assert [number(x, 2, sign=True) for x in (150.0, -3.25, 0.5)] == ["+150", "-3.2", "+0.5"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.1 + 0.2, "0.3"),
+        (3.0, "3.0"),
+        (16777217, "16777217"),
+        (np.float32(0.3), "0.3"),
+        (np.int64(4), "4"),
+        ((0.1 + 0.2, 1), "(0.3, 1)"),
+        ([np.float64(0.1) * 3, None], "[0.3, None]"),
+        (True, "True"),
+    ],
+)
+def test_what_was_found_is_told_without_errors_of_rounding(value, text):
+    assert str(InputError("x", "", value, "y")) == f"x: got {text}, expected y"
+
+
+class _Tooth(Strict):
+    teeth: Annotated[float, Si("", gt=0, lt=10)]
+    width: Annotated[float, Si("m", gt=0, le=1e5)]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"teeth": {"value": 19.5, "unit": 1}, "width": "1 mm"}, "teeth: got 19.5, expected a number"),
+        ({"teeth": 3, "width": {"value": 0.1 + 0.2, "unit": "s"}}, "width: got 0.3 s, expected"),
+        ({"teeth": 3, "width": {"value": -1, "unit": "m"}}, "> 0 and <= 100000"),
+    ],
+)
+def test_numbers_of_yaml_are_told_as_people_write_them(content, words):
+    with pytest.raises(InputError) as caught:
+        validate(_Tooth, content, "x")
+    assert words in str(caught.value)
+
+
+def test_counted_things():
+    assert [plural(1, "gap"), plural(3, "gap"), plural(2, "entry", "entries")] == [
+        "1 gap",
+        "3 gaps",
+        "2 entries",
+    ]

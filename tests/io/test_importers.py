@@ -235,6 +235,9 @@ def test_the_user_knows_better(tmp_path):
         ("m/s²", 1.0, "m/s^2"),
         ("mm/s^2", 1e-3, "m/s^2"),
         ("ft/s^2", 0.3048, "m/s^2"),
+        ("metre/second**2", 1.0, "m/s^2"),
+        ("mg", 9.80665e-3, "m/s^2"),
+        ("mm/s", 1.0, "mm/s"),
         ("V", 1.0, "V"),
         ("Pa", 1.0, "Pa"),
         ("1", 1.0, "1"),
@@ -371,6 +374,11 @@ def test_missing_files_and_pickles(tmp_path):
             "x in m/s^2, y in V",
         ),
         ({"a": SIGNAL}, {"x": {"variable": "a", "unit": "parsnips"}}, "unit: got parsnips"),
+        (
+            {"a": SIGNAL},
+            {"x": {"variable": "a", "unit": "furlong"}},
+            "got furlong, expected one of g, mg",
+        ),
     ],
 )
 def test_channels_that_do_not_go_together(tmp_path, variables, section, words):

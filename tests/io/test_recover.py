@@ -192,6 +192,27 @@ def test_nothing_to_save(tmp_path, content):
     assert not (tmp_path / "out").exists()
 
 
+def test_what_is_no_bag_is_told_as_that_and_not_sent_to_recovery(tmp_path):
+    file = tmp_path / "x.mcap"
+    file.write_text("time,acceleration\n" * 100)
+    for read in (lambda: list(read_bag(file)), lambda: recover(file, tmp_path / "out")):
+        with pytest.raises(InputError, match=r"no MCAP file \(its magic bytes are b'time,acc'\)") as caught:
+            read()
+        assert "./gearsim recover" not in str(caught.value)
+    assert info(file).problem.startswith("no MCAP file")
+
+
+def test_a_bag_whose_first_bytes_are_damaged_is_one_all_the_same(bag, original, tmp_path):
+    def spoil(file):
+        file.write_bytes(b"spoiled!" + file.read_bytes()[8:])
+
+    folder = damaged(bag, tmp_path, spoil)
+    with pytest.raises(InputError, match=r"\./gearsim recover"):
+        list(read_bag(folder))
+    saved, _ = save(folder, tmp_path)
+    assert saved == original
+
+
 def test_the_new_bag_must_be_new(bag, tmp_path):
     (tmp_path / "out").mkdir()
     with pytest.raises(InputError, match="a folder that exists already"):

@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 
 import click
 
+from gearsim_io.stated_speed import parse_speed
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -23,6 +25,23 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class SpeedInHz(click.ParamType):
+    """A speed in Hz, or with its unit: `29.9`, `29.9Hz`, `1796rpm`."""
+
+    name = "speed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The speed in Hz, or a complaint that names the option and the units."""
+        if isinstance(value, float):
+            return value
+        try:
+            return parse_speed(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+SPEED = SpeedInHz()
+SPEED_HELP = "Nominal speed of the reference shaft in Hz, or with its unit, such as 1796rpm."
 FORMATS = ("mcap", "npz", "wav")  # that a run can be written in
 POSITIVE = FiniteRange(min=0, min_open=True)
 ANY_PATH = click.Path(path_type=Path)  # existence is checked where the error can say what was expected

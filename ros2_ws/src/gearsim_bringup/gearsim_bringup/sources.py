@@ -11,6 +11,7 @@ from gearsim_io.importers import Overrides, import_file, machine_for
 from gearsim_io.machines import load_machine, machine_names
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
+from gearsim_io.stated_speed import FROM_USER, with_speed
 
 
 def open_source(path: Path, machine: str | None, overrides: Overrides) -> tuple[Record, Machine]:
@@ -32,7 +33,7 @@ def open_source(path: Path, machine: str | None, overrides: Overrides) -> tuple[
             raise InputError(str(path), "MachineInfo", "none in the bag", _machine_option())
         record = read_record(path)
         if overrides.speed_hz is not None:
-            notes = {**record.notes, "speed_hz": f"{overrides.speed_hz:.9g}"}
+            notes = with_speed(record.notes, overrides.speed_hz, FROM_USER, known)
             record = dataclasses.replace(record, notes=notes)
         return record, machine_for(record, known)
     if machine is None:

@@ -9,15 +9,19 @@ from scipy import fft as sfft
 
 from gearsim_dsp.kinematics import fault_families
 from gearsim_io.nameplate import Machine
+from gearsim_io.numbers import number
 
-__all__ = ["Band", "BandPlan", "plan_bands"]
+__all__ = ["LEAST_TURNS", "Band", "BandPlan", "least_window_s", "plan_bands"]
 
 TOP_SHARE = 0.46
 """Highest share of the sampling rate used: above lie anti-alias filters, where a few quanta look impulsive.
 """
 
+LEAST_TURNS = 8.0
+"""Turns of the reference shaft in a window, below which bearings cannot be judged."""
+
 _MAX_BANDS = 12
-_MIN_TURNS = 8.0
+_SLOWER = 1.1  # a machine may run that much slower than it is said to
 _HARMONICS = 8
 _BAND_HARMONICS = 4
 _CLEAR_OF = 6.0
@@ -62,6 +66,11 @@ class BandPlan:
         return Band(low, low + width, band.why)
 
 
+def least_window_s(speed_hz: float) -> float:
+    """Length of windows that hold `LEAST_TURNS` of a shaft of about that speed, in tenths of a second."""
+    return math.ceil(10 * _SLOWER * LEAST_TURNS / speed_hz) / 10
+
+
 def plan_bands(
     samples: int, sample_rate_hz: float, speed_hz: float, machine: Machine
 ) -> tuple[BandPlan | None, list[tuple[str, str]]]:
@@ -86,9 +95,11 @@ def plan_bands(
     if not families or not (math.isfinite(speed_hz) and speed_hz > 0):
         return None, []
     turns = samples / sample_rate_hz * speed_hz
-    if turns < _MIN_TURNS:
-        least = f"at least {_MIN_TURNS:.0f} are needed ({_MIN_TURNS / speed_hz:.2g} s at {speed_hz:.3g} Hz)"
-        return None, [("too_short", f"{turns:.1f} turns of the shaft; {least}")]
+    if turns < LEAST_TURNS:
+        least_s = number(LEAST_TURNS / speed_hz, 2)
+        need = f"at least {LEAST_TURNS:.0f} are needed ({least_s} s at {number(speed_hz, 3)} Hz)"
+        detail = f"bearings cannot be judged by {turns:.1f} turns of the shaft; {need}"
+        return None, [("too_short", detail)]
     plan_hz = _plan_speed(speed_hz, machine.nominal_speed_hz)
     reach_hz = plan_hz * max(f.order + f.sideband_order for f in families)
     least_width = 2.2 * reach_hz

@@ -14,17 +14,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gearsim_dsp.angle.record_speed import RecordSpeed, record_speed
+from gearsim_dsp.bands import least_window_s
 from gearsim_dsp.electrical import ElectricalLines, find_electrical_lines
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.judges.bearing import Verdict, find_faults
 from gearsim_dsp.judges.combine import all_findings
-from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.judges.finding import LEAST_CONFIDENCE, Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.sizes import with_size
 from gearsim_dsp.judges.strange import find_strange_comb
 from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.quality import QualityIssue, check_levels
-from gearsim_dsp.remarks import record_remarks, what_is_lacking
+from gearsim_dsp.remarks import LEAST_WINDOW_S, record_remarks, too_short, what_is_lacking
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
@@ -35,13 +36,14 @@ from gearsim_io.batches import TorqueBatch
 from gearsim_io.errors import InputError
 from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
+from gearsim_io.numbers import number, plural
 from gearsim_io.record import Record
+from gearsim_io.stated_speed import FROM_FILE, FROM_USER, given_far_off, origin_words
 
 _IMPACT_PROBABILITY = 1e-4
-LEAST_CONFIDENCE = 0.3
-"""What is less sure is told as "doubtful_finding" in `quality`, and is no finding."""
+_ORIGIN = {FROM_USER: "as given, not measured", FROM_FILE: "as stated in the file, not measured"}
 
-__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose_record"]
+__all__ = ["LEAST_CONFIDENCE", "Diagnosis", "DiagnosisSettings", "diagnose_record"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,8 @@ class DiagnosisSettings:
 class Diagnosis:
     """What is known of a machine after one record; `angle` is that of its reference shaft over the record.
 
-    `doubtful` are those below `LEAST_CONFIDENCE`, which are no findings.
+    `doubtful` are those below `LEAST_CONFIDENCE`, which are no findings. `nominal_from` tells in words where
+    a speed comes from that was not measured.
     """
 
     speed: ShaftSpeed
@@ -89,6 +92,7 @@ class Diagnosis:
     angle: RecordSpeed = field(default=RecordSpeed(None), repr=False, compare=False)
     lacking: str = ""
     doubtful: tuple[Finding, ...] = ()
+    nominal_from: str = "nameplate"
 
     @property
     def judged(self) -> bool:
@@ -115,7 +119,8 @@ class Diagnosis:
         lines = []
         if np.isfinite(speed.value_hz):
             half = 50 * (speed.ci95_hz[1] - speed.ci95_hz[0]) / speed.value_hz
-            lines.append(f"speed: {speed.value_hz:.3f} Hz +- {half:.2g} % ({speed.source})")
+            source = self.nominal_from if speed.source == "nameplate" else speed.source
+            lines.append(f"speed: {speed.value_hz:.3f} Hz +- {_error(half)} % ({source})")
         else:
             lines.append("speed: not known")
         lines += [
@@ -129,6 +134,10 @@ class Diagnosis:
             nothing = f"no fault found: nothing could be judged{self.lacking}"
             lines.append(judged if self.judged else nothing)
         return lines
+
+
+def _error(percent: float) -> str:
+    return number(percent, 2) if percent >= 1e-3 else "less than 0.001"
 
 
 def _finding_line(finding: Finding) -> str:
@@ -148,7 +157,8 @@ def _size_words(finding: Finding) -> str:
     if finding.size is None:
         return ""
     low, high = finding.size.ci95_mm
-    return f"about {finding.size.value_mm:.2g} mm wide ({low:.2g} to {high:.2g}), "
+    width, low_mm, high_mm = (number(mm, 2) for mm in (finding.size.value_mm, low, high))
+    return f"about {width} mm wide ({low_mm} to {high_mm}), "
 
 
 def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSettings | None = None) -> Diagnosis:
@@ -186,8 +196,10 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         # Single windows do not tell the speed, but the whole record does.
         pool, reports, impulsive = _by_windows(record, plate, known, window, settings.batch_samples)
         verdict = find_faults(plate, pool)
-    notes = _quality(record, plate, verdict, reports)
     speed = angle.speed or verdict.speed
+    # Where no window could be judged, the speed of the record is known all the same.
+    told = speed if angle.replaces_angle or verdict.speed.source == "nameplate" else verdict.speed
+    notes = _quality(record, plate, reports, told)
     # A wrong angle signal is not to be read again.
     sound = replace(record, tachos=(), encoders=()) if angle.replaces_angle else record
     measured = Measured.of_record(sound, plate, speed)
@@ -203,7 +215,7 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     notes += record_remarks(record, measured)
     quality = (*angle.issues, *notes, *electrical, *(() if findings else _unexplained(verdict, impulsive)))
     return Diagnosis(
-        speed if angle.replaces_angle else verdict.speed,
+        told,
         tuple(dict.fromkeys(quality)),
         findings,
         plate.name,
@@ -211,8 +223,9 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         verdict,
         _judged_parts(measured, verdict),
         angle,
-        what_is_lacking(plate, measured),
+        what_is_lacking(plate, measured, record.seconds),
         doubtful,
+        _ORIGIN.get(record.notes.get("speed from", ""), "nameplate"),
     )
 
 
@@ -260,18 +273,22 @@ def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> Wi
     if np.isfinite(machine.nominal_speed_hz):
         slowest = min((machine.shaft(one.shaft).ratio for one in machine.bearings), default=1.0)
         length = max(length, settings.least_turns / (slowest * machine.nominal_speed_hz))
-    length = float(np.clip(length, 0.05, 60.0))
+        length = max(length, least_window_s(machine.nominal_speed_hz) if machine.bearings else 0.0)
+    length = float(np.clip(length, LEAST_WINDOW_S, 60.0))
     if record.seconds < length:
-        length = max(0.05, np.floor(record.sample_count * 0.999) / record.sample_rate_hz)
+        length = max(LEAST_WINDOW_S, np.floor(record.sample_count * 0.999) / record.sample_rate_hz)
     return WindowSettings(window_s=length, hop_s=max(0.01, length / 4), angle_wait_s=0.0)
 
 
-def _quality(record: Record, machine: Machine, verdict: Verdict, reports: list[Report]) -> list[QualityIssue]:
+def _quality(
+    record: Record, machine: Machine, reports: list[Report], speed: ShaftSpeed
+) -> list[QualityIssue]:
     issues = _merged(reports)
     if not reports:
-        detail = f"{record.seconds:.3g} s are too short for one window"
-        issues.append(QualityIssue("too_short", "", detail, True))
-    issues += _about_speed(machine, verdict.speed)
+        least = too_short(machine, record.seconds)
+        samples = f"{plural(record.sample_count, 'sample')}, {number(record.seconds, 2)} s"
+        issues.append(QualityIssue("too_short", "", f"{samples}{least and f'; {least}'}", True))
+    issues += _about_speed(record, machine, speed)
     issues += check_levels(record, machine)
     if not machine.bearings:
         detail = "the nameplate lists no bearings: no fault family could be looked for"
@@ -307,20 +324,23 @@ def _merged(reports: list[Report]) -> list[QualityIssue]:
     ]
 
 
-def _about_speed(machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
+def _about_speed(record: Record, machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
     issues = []
     nominal, tolerance = machine.nominal_speed_hz, machine.speed_tolerance
+    said = origin_words(record.notes, nominal)
     if not np.isfinite(speed.value_hz):
         detail = "no tacho, no nominal speed, and no comb of shaft lines in the signal"
         issues.append(QualityIssue("speed_unknown", "", detail))
     elif speed.source == "nameplate":
         reason = f" ({speed.note})" if speed.note else ""
-        detail = f"the nameplate's {nominal:.4g} Hz +- {100 * tolerance:.2g} % is taken{reason}"
+        detail = f"{said} +- {number(100 * tolerance, 2)} % is taken{reason}"
         issues.append(QualityIssue("speed_not_measured", "", detail))
     elif np.isfinite(nominal) and abs(speed.value_hz / nominal - 1) > tolerance:
-        percent = 100 * (speed.value_hz / nominal - 1)
-        detail = f"{speed.value_hz:.4g} Hz is {percent:+.2g} % off the nameplate's {nominal:.4g} Hz"
+        percent = number(100 * (speed.value_hz / nominal - 1), 2, sign=True)
+        detail = f"{number(speed.value_hz, 4)} Hz is {percent} % off {said}"
         issues.append(QualityIssue("speed_off_nameplate", "", detail))
+    if far := given_far_off(record.notes, tolerance):
+        issues.append(QualityIssue("speed_off_nameplate", "", far))
     if speed.source in ("tacho", "encoder") and speed.note:
         issues.append(QualityIssue(f"{speed.source}_mended", "", speed.note))
     return issues

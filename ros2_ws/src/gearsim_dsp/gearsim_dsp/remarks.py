@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
+from gearsim_dsp.bands import LEAST_TURNS
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.shaft import undecided_orders
 from gearsim_dsp.judges.unlisted import unlisted_mesh
 from gearsim_dsp.quality import QualityIssue
 from gearsim_dsp.stated_rate import doubt_of_rate
 from gearsim_io.nameplate import Machine
+from gearsim_io.numbers import number
 from gearsim_io.record import Record
 
-__all__ = ["record_remarks", "what_is_lacking"]
+__all__ = ["LEAST_WINDOW_S", "record_remarks", "too_short", "what_is_lacking"]
+
+LEAST_WINDOW_S = 0.05
+"""Shortest window that is looked at."""
 
 
 def record_remarks(record: Record, measured: Measured) -> list[QualityIssue]:
@@ -29,13 +36,25 @@ def record_remarks(record: Record, measured: Measured) -> list[QualityIssue]:
     return remarks + ([mesh] if mesh else [])
 
 
-def what_is_lacking(machine: Machine, measured: Measured) -> str:
-    """Why nothing could be judged, as far as that is plain; for the end of a sentence."""
+def what_is_lacking(machine: Machine, measured: Measured, seconds: float) -> str:
+    """Why nothing could be judged in a record of that length, as far as that is plain; ends a sentence."""
     if not _has_parts(machine):
         return ": the nameplate lists neither bearings nor pairs of gears"
+    if least_s := too_short(machine, seconds):
+        return f": {number(seconds, 2)} s are too short; {least_s}"
     if not measured.channels:
         return ": no channel is fit for it"
     return "" if measured.phase is not None else ": the angle is not known"
+
+
+def too_short(machine: Machine, seconds: float) -> str:
+    """How long a record must at least be, where that one is not; else empty."""
+    nominal = machine.nominal_speed_hz
+    least_s = LEAST_TURNS / nominal if math.isfinite(nominal) and nominal > 0 else LEAST_WINDOW_S
+    if seconds >= max(least_s, LEAST_WINDOW_S):
+        return ""
+    turns = f" ({LEAST_TURNS:.0f} turns at {number(nominal, 3)} Hz)" if least_s > LEAST_WINDOW_S else ""
+    return f"at least {number(max(least_s, LEAST_WINDOW_S), 2)} s{turns} are needed"
 
 
 def _has_parts(machine: Machine) -> bool:

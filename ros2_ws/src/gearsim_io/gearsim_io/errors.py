@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from numbers import Real
+
+from gearsim_io.numbers import written
 from gearsim_io.same_unit import in_unit_of
 from gearsim_io.suggest import did_you_mean
 
@@ -39,9 +42,9 @@ class InputError(ValueError):
     def _value_text(self) -> str:
         if isinstance(self.value, str):
             return self.value
-        if isinstance(self.value, (int, float)) and not isinstance(self.value, bool):
+        if isinstance(self.value, Real) and not isinstance(self.value, bool):
             return in_unit_of(self.expected, self.value, self.field)
-        return repr(self.value)
+        return written(self.value)
 
 
 class EnvironmentLackError(RuntimeError):

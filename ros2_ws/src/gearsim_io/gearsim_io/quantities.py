@@ -23,6 +23,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from gearsim_io.errors import InputError
+from gearsim_io.numbers import number, written
 from gearsim_io.places import place_in
 from gearsim_io.yaml_errors import syntax_error
 
@@ -60,7 +61,7 @@ class Si:
     def expected(self) -> str:
         """The accepted values in words."""
         pairs = ((">", self.gt), (">=", self.ge), ("<", self.lt), ("<=", self.le))
-        bounds = " and ".join(f"{sign} {bound:g}" for sign, bound in pairs if bound is not None)
+        bounds = " and ".join(f"{sign} {number(bound)}" for sign, bound in pairs if bound is not None)
         what = f"a number in {self.unit}" if self.unit else "a number without unit"
         return f"{what}, {bounds}" if bounds else what
 
@@ -167,8 +168,13 @@ def _first(error: ValidationError) -> ErrorDetails:
 def _as_written(value: Any) -> Any:
     """A number with its unit as people write it, anything else as it is."""
     if isinstance(value, Mapping) and "value" in value:
-        return f"{value['value']} {value.get('unit', '')}".strip()
+        unit = str(value.get("unit", ""))
+        return f"{_plain(value['value'])} {'' if unit == '1' else unit}".strip()
     return value
+
+
+def _plain(value: Any) -> Any:
+    return written(value) if isinstance(value, float) else value
 
 
 def load_yaml(model: type[ModelT], path: Path, *, require_source: bool = False) -> ModelT:

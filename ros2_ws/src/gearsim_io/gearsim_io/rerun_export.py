@@ -25,7 +25,7 @@ WINDOW = (1600, 1000)
 _POINTS = 20_000
 _PICTURE_POINTS = 3_000
 _PICTURE_SPECTRA_S = 3.0
-# The viewer draws what a recording of some MB holds within seconds, and may take long where all cores are busy.
+# The viewer draws some MB within seconds, and may take long where all cores are busy.
 _DRAWS_S, _DRAWS_S_PER_MB = 300.0, 30.0
 _SWITCH_S = 120.0
 _TELL_EVERY = 256  # messages

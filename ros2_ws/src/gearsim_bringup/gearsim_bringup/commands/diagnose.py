@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
+from gearsim_bringup.options import ANY_PATH, POSITIVE, SPEED, SPEED_HELP, example, json_option
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
@@ -24,7 +24,7 @@ EXAMPLE = """
 @click.option(
     "--column", "--variable", "columns", multiple=True, help="Variable or column to take; repeatable."
 )
-@click.option("--speed", type=POSITIVE, help="Nominal speed of the reference shaft in Hz.")
+@click.option("--speed", type=SPEED, help=SPEED_HELP)
 @click.option("--report", type=ANY_PATH, metavar="DIR", help="New folder for a page with verdict and plots.")
 @json_option
 def command(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
+from gearsim_bringup.options import ANY_PATH, POSITIVE, SPEED, SPEED_HELP, example, json_option
 from gearsim_bringup.ui import Voice
 
 EXAMPLE = """
@@ -25,7 +25,7 @@ EXAMPLE = """
     "--column", "--variable", "columns", multiple=True, help="Variable or column to take; repeatable."
 )
 @click.option("--channel", "channels", multiple=True, help="Name of the channel; one per --column.")
-@click.option("--speed", type=POSITIVE, help="Nominal speed of the reference shaft in Hz.")
+@click.option("--speed", type=SPEED, help=SPEED_HELP)
 @json_option
 def command(
     files: tuple[Path, ...],

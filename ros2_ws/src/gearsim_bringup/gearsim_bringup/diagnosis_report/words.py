@@ -265,9 +265,10 @@ def record_rows(material: Material) -> list[Row]:
     ]
     if math.isfinite(speed.value_hz):
         half = 50 * (speed.ci95_hz[1] - speed.ci95_hz[0]) / speed.value_hz
+        nominal = material.diagnosis.nominal_from
         source = {
             "estimated": "found in the vibration",
-            "nameplate": "from the nameplate",
+            "nameplate": "from the nameplate" if nominal == "nameplate" else nominal,
             "tacho": "from the tacho",
             "encoder": "from the encoder",
         }[speed.source]

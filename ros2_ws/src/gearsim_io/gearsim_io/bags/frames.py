@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
+from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from mcap.data_stream import ReadDataStream
@@ -40,6 +41,17 @@ class Piece(NamedTuple):
     end: int
     whole: bool
     sound: bool
+
+
+def foreign(file: Path) -> str:
+    """What a file is if it is no MCAP file, in words; empty for one, however damaged, or an empty file."""
+    if file.stat().st_size == 0:
+        return ""
+    with open(file, "rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        head = data[: len(MAGIC)]
+        if MAGIC.startswith(head) or data[-len(MAGIC) :] == MAGIC or _next_chunk(data, 0) is not None:
+            return ""
+        return f"no MCAP file (its magic bytes are {head!r})"
 
 
 def body(data: Data, piece: Piece) -> ReadDataStream:

@@ -17,6 +17,7 @@ from gearsim_io import definitions
 from gearsim_io.errors import InputError
 from gearsim_io.qos import Qos
 
+A_BAG = "a bag, as record, import and simulate write them"
 METADATA = "metadata.yaml"
 VERSION = 9
 # rosbag2's words for "no message yet"

@@ -15,7 +15,8 @@ from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata,
 from mcap.stream_reader import CRCValidationError, StreamReader
 
 from gearsim_io import cdr, definitions
-from gearsim_io.bags.layout import BagError, TopicInfo, Totals, bag_files, parse_qos
+from gearsim_io.bags.frames import foreign
+from gearsim_io.bags.layout import A_BAG, BagError, TopicInfo, Totals, bag_files, parse_qos
 from gearsim_io.errors import InputError
 
 _MAGIC_BYTES = 8
@@ -181,6 +182,8 @@ class _Scan:
             except InputError:
                 raise
             except _BAD as error:
+                if what := foreign(file):
+                    raise InputError(str(file), "", what, A_BAG) from None
                 expected = f"a sound bag; ./gearsim recover {self._info.path} saves what can be saved"
                 place, size = stream.tell(), file.stat().st_size
                 reason = "the file is cut off" if place >= size else _reason(error)

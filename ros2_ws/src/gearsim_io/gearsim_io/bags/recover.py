@@ -12,8 +12,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, MessageIndex, Metadata, Schema
 
-from gearsim_io.bags.frames import BAD, MAGIC, Data, Piece, body, chunk_span_ns, inner, pieces
-from gearsim_io.bags.layout import TopicInfo, bag_files
+from gearsim_io.bags.frames import BAD, MAGIC, Data, Piece, body, chunk_span_ns, foreign, inner, pieces
+from gearsim_io.bags.layout import A_BAG, TopicInfo, bag_files
 from gearsim_io.bags.reader import check_type, topic_of
 from gearsim_io.bags.writer import BagWriter
 from gearsim_io.errors import InputError
@@ -61,7 +61,10 @@ def recover(path: Path | str, out: Path | str) -> Recovery:
     BagError
         If the new bag cannot be written to the end.
     """
-    found = [_Salvage(file) for file in bag_files(Path(path))]
+    files = bag_files(Path(path))
+    if all(map(foreign, files)):
+        raise InputError(str(path), "", f"no whole message in it: {foreign(files[0])}", A_BAG)
+    found = [_Salvage(file) for file in files]
     if not any(salvage.has_messages() for salvage in found):
         raise InputError(str(path), "", "no whole message in it", "a bag with something to save")
     custom = {key: value for salvage in found for key, value in salvage.custom_data.items()}

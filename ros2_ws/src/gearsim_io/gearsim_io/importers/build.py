@@ -26,6 +26,7 @@ from gearsim_io.importers.units import to_hz, to_si
 from gearsim_io.machines import load_machine
 from gearsim_io.nameplate import Machine
 from gearsim_io.record import Record
+from gearsim_io.stated_speed import FROM_FILE, FROM_USER, OPTION, check_speed, with_speed
 
 # Rates given in several places are one and the same if they differ by less (rounding to whole Hz).
 _RATE_TOLERANCE = 1e-4
@@ -70,9 +71,11 @@ def import_file(
     scaled, unit = _scaled(where, channels, wanted, notes)
     for name, values in scaled.items():
         _check_signal(where, name, values, notes)
+    plate = None if machine is None else load_machine(machine)
     speed_hz = _speed(path, content, settings, wanted)
     if speed_hz is not None:
-        notes["speed_hz"] = f"{speed_hz:.9g}"
+        origin = FROM_FILE if wanted.speed_hz is None else FROM_USER
+        notes = with_speed(notes, speed_hz, origin, plate)
     load = _value(path, content, settings.load, "load")
     if load is not None and settings.load is not None:
         notes["load"] = f"{load:.9g} {settings.load.unit}"
@@ -81,18 +84,26 @@ def import_file(
         channels=tuple(scaled),
         unit=unit,
         data=np.stack([values.astype(np.float32) for values in scaled.values()]),
-        machine="" if machine is None else load_machine(machine).name,
+        machine="" if plate is None else plate.name,
         source=where,
         notes=notes,
     )
 
 
 def machine_for(record: Record, machine: Machine) -> Machine:
-    """The nameplate with the speed that the record's file states as nominal speed, where it states one."""
+    """The nameplate with the speed that file or user state as nominal speed, where they state one.
+
+    Raises
+    ------
+    InputError
+        If that is far off the nameplate's, as when rpm are taken for Hz.
+    """
     text = record.notes.get("speed_hz")
     if text is None:
         return machine
     speed_hz = float(text)
+    given = record.notes.get("speed from") == FROM_USER
+    check_speed(OPTION if given else f"{record.source}: speed", speed_hz, machine)
     shafts = tuple(replace(shaft, nominal_speed_hz=shaft.ratio * speed_hz) for shaft in machine.shafts)
     return replace(machine, shafts=shafts)
 

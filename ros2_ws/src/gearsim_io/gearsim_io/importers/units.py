@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 from gearsim_io.errors import InputError
 
@@ -10,34 +11,60 @@ STANDARD_GRAVITY = 9.80665
 _NONE = ("", "1", "-", "none", "unknown")
 # Pint takes g for grams.
 _GRAVITY = ("g", "G", "gn", "g_n", "g0", "g's")
+ACCELERATIONS = ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "Gal")
+OTHERS = ("m/s", "mm/s", "in/s", "m", "mm", "um", "V", "mV", "A", "mA", "Pa", "kPa", "N", "N*m")
+"""What else sensors give: velocity, displacement, raw voltage or current, sound, force, torque."""
 
 
 @cache
 def to_si(where: str, unit: str) -> tuple[float, str]:
     """Factor and unit under which a signal in `unit` is kept; "1" where none is stated.
 
+    Any spelling of a unit of `ACCELERATIONS` or `OTHERS` is understood.
+
     Raises
     ------
     InputError
-        If nobody knows such a unit.
+        If sensors have no such unit.
     """
     text = unit.strip().replace("²", "^2").replace("s2", "s^2")
     if text.lower() in _NONE:
         return 1.0, "1"
     if text in _GRAVITY:
         return STANDARD_GRAVITY, "m/s^2"
+    if text in ("mg", "milli-g"):
+        return 1e-3 * STANDARD_GRAVITY, "m/s^2"
     if text == "m/s^2":
         return 1.0, text
+    if text in OTHERS:
+        return 1.0, text
+    wanted = _quantity(text)
+    if wanted is not None:
+        for known in ACCELERATIONS:
+            if wanted == _quantity(known):
+                return float(wanted.to("m/s^2").magnitude), "m/s^2"
+        if any(wanted == _quantity(known) for known in OTHERS):
+            return 1.0, text
+    expected = f"one of g, mg, {', '.join(ACCELERATIONS + OTHERS)}, or 1 where none is stated"
+    raise InputError(where, "unit", unit, expected)
+
+
+@cache
+def _quantity(text: str) -> Any:
+    """One of that unit; None where nobody knows it."""
     import pint  # here, because it takes a quarter of a second to load
 
     try:
-        quantity = pint.UnitRegistry().Quantity(1.0, text)
+        return _registry().Quantity(1.0, text)
     except (pint.PintError, AttributeError, ValueError, AssertionError):
-        raise InputError(where, "unit", unit, "g, m/s^2, another unit, or 1 where none is stated") from None
-    try:
-        return float(quantity.to("m/s^2").magnitude), "m/s^2"
-    except pint.PintError:
-        return 1.0, text
+        return None
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
 
 
 def to_hz(where: str, value: float, unit: str) -> float:
