@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
-from gearsim_dsp.bands import Band
 from gearsim_dsp.comb import CombGrid, comb_grid, score_combs
 from gearsim_dsp.evidence import ChannelSpectra
+from gearsim_dsp.family_evidence import BandLevel, FamilyEvidence, proves, weight
 from gearsim_dsp.kinematics import FaultFamily
 from gearsim_dsp.noise_floor import LineTail, local_floor, search_false_alarm
 from gearsim_dsp.shaft_lines import (
@@ -31,7 +32,6 @@ _SKIP_LINES = 4
 _LINE_HALF_WIDTH = 1.6
 _MOST_DOMINANCE = 1000.0
 _CLEAR = 12.0
-_SURE, _DOMINANT = 1e-4, 1.6
 # Powers of a band over that of the channel, and over that of the loudest channel, below which it holds only
 # leakage and rounding: sensors and converters do not reach so far down.
 _LEAST_OF_OWN, _LEAST_OF_ALL = 1e-7, 1e-8
@@ -41,64 +41,6 @@ _TOP_HARMONICS = 4
 _OWN_SIDEBANDS = 4
 _SHAFT_SIDEBANDS = 1
 _CELL_SHARE = 0.5  # independent looks per resolution cell of the 8th harmonic, counted on noise
-
-
-@dataclass(frozen=True, slots=True)
-class BandLevel:
-    """A family in one band: modulated power in the signal's unit squared, and whether its comb is
-    significant.
-    """
-
-    band: Band
-    amplitude: float
-    clear: bool
-
-
-@dataclass(frozen=True, slots=True)
-class FamilyEvidence:
-    """How strongly one channel shows one fault family, after one or many windows.
-
-    Parameters
-    ----------
-    family : FaultFamily
-    channel : str
-    band : Band
-        Band in which it shows best.
-    found_order, found_hz : float
-        The comb's fundamental: its harmonics' interpolated peaks, weighted by their precision.
-    harmonic_snr_db, sideband_snr_db : tuple of float
-        Power over the local floor at harmonics 1, 2, ... and at the stronger sideband of each of the first.
-    snr_db : float
-        The strongest of the first four harmonics.
-    false_alarm_probability : float
-        That noise shows as much anywhere in the bands, channels, families and orders searched.
-    modulation : float
-        Mean square of the family's lines in the squared envelope over its squared mean (effect size).
-    dominance : float
-        The family's modulation over that of the strongest unrelated comb in the same band; 0 where the
-        false-alarm probability is above 0.01 anyway.
-    by_band : tuple of BandLevel
-        The same band by band, to compare channels.
-    windows : int
-        Windows averaged.
-    covered_by : ShaftMultiple or None
-        The shaft's lines that the family's own cannot be told from; its other lines are then the floor.
-    """
-
-    family: FaultFamily
-    channel: str
-    band: Band
-    found_order: float
-    found_hz: float
-    harmonic_snr_db: tuple[float, ...]
-    sideband_snr_db: tuple[float, ...]
-    snr_db: float
-    false_alarm_probability: float
-    modulation: float
-    dominance: float
-    by_band: tuple[BandLevel, ...]
-    windows: int
-    covered_by: ShaftMultiple | None = None
 
 
 class FamilySearch:
@@ -139,6 +81,7 @@ class FamilySearch:
         ratio, tail = self._with_mean(spectra.power / floor)
         self._view = SpectrumView(ratio, tail, spectra.power - floor, self._free_of(turns))
         self._over_shafts: dict[ShaftMultiple, SpectrumView] = {}
+        self._top_width = 2 * round(self._resolution / spectra.order_step) + 1
         self._explained = np.zeros(spectra.power.shape[1], dtype=np.bool_)
 
     def _with_mean(self, ratio: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -175,19 +118,31 @@ class FamilySearch:
         return np.asarray(lines * self._spectra.order_step)
 
     def judge(self, family: FaultFamily) -> FamilyEvidence:
-        """Evidence of a family on this channel; where a shaft covers it, the better of two ways to look."""
+        """Evidence of a family on this channel; where a shaft covers it, the better of two ways to look.
+
+        Where harmonics that can be parted from the shaft's prove the family, all count for its size.
+        """
         plain = self._judged(family, None)
         multiple = covering_multiple(self._machine, family, self._resolution / self._scale, self._doubt)
         if multiple is None:
             return plain
-        return max(plain, self._judged(family, multiple), key=_weight)
+        if proves(plain):
+            size = max(plain.modulation, self._whole_size(plain, multiple))
+            plain = replace(plain, modulation=size, covered_by=multiple)
+        return max(plain, self._judged(family, multiple), key=weight)
+
+    def _whole_size(self, found: FamilyEvidence, multiple: ShaftMultiple) -> float:
+        """Modulation with the lines that fall on the shaft's, as far as they are above its other lines."""
+        grid = self._grid(found.family, found.found_order * self._scale, 0.0)
+        sizes = self._modulation(self._view_of(multiple), grid, 0)
+        return float(sizes[self._spectra.bands.index(found.band)])
 
     def _judged(self, family: FaultFamily, multiple: ShaftMultiple | None) -> FamilyEvidence:
         half_width = family.tolerance + self._doubt
         grid = self._grid(family, family.order * self._scale, half_width)
         view = self._view_of(multiple)
         scores = score_combs(view.tail, view.usable, grid)
-        row, best = self._peak(view, grid, scores.score)
+        row, best = self._peak(view, grid, scores.score, multiple is not None)
         trials = scores.score.shape[0] * self._independent_orders(family, half_width)
         p = search_false_alarm(min(1.0, float(np.exp(-scores.score[row].max()))), trials * self._looks)
         modulation = self._modulation(view, grid, best)
@@ -265,13 +220,21 @@ class FamilySearch:
         sideband = family.sideband_order * self._scale
         return comb_grid(order, half_width, self._spectra.order_step, lines, sideband, self._resolution)
 
-    def _peak(self, view: SpectrumView, grid: CombGrid, score: NDArray[np.float64]) -> tuple[int, int]:
-        """Row and candidate of the best comb; of candidates about as improbable, that on the lines' tops."""
+    def _peak(
+        self, view: SpectrumView, grid: CombGrid, score: NDArray[np.float64], over: bool
+    ) -> tuple[int, int]:
+        """Row and candidate of the best comb; of candidates about as improbable, that on the lines' tops.
+
+        Next to a shaft's line, where the true ones cannot be used, its flanks can: where lines are not
+        measured `over` a shaft, the first usable ones count, less what stands higher within a resolution.
+        """
         row = int(np.argmax(score.max(axis=1)))
         near = score[row] >= _PLATEAU * score[row].max()
-        index = grid.harmonics[:, :_TOP_HARMONICS]
+        index = grid.harmonics[:, : _TOP_HARMONICS if over else None]
         on = (index >= 0) & view.usable[index]
-        height = np.log(np.maximum(view.ratio[row, index], 1e-3)) * on
+        on &= np.cumsum(on, axis=1) <= _TOP_HARMONICS
+        top = np.log(np.maximum(view.ratio[row], 1e-3))
+        height = (top if over else 2 * top - maximum_filter1d(top, self._top_width))[index] * on
         # The mean, not the sum: a candidate must not lose because one of its lines falls on the shaft's.
         mean = height.sum(axis=1) / np.maximum(on.sum(axis=1), 1)
         return row, int(np.argmax(np.where(near & (on.sum(axis=1) >= 2), mean, -np.inf)))
@@ -373,11 +336,3 @@ class FamilySearch:
             number = np.maximum(1.0, np.round((order - shift) / found))
             lines |= np.abs(order - shift - number * found) < width
         return lines
-
-
-def _weight(evidence: FamilyEvidence) -> tuple[bool, float]:
-    """What is improbable counts first, then size, as far as it is dominant."""
-    p = evidence.false_alarm_probability
-    if p >= _SURE:
-        return False, -p
-    return True, evidence.modulation * min(evidence.dominance, _DOMINANT)

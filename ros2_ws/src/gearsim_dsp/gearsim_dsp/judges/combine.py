@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from gearsim_dsp.judges.finding import Finding
+from gearsim_dsp.judges.finding import LEAST_CONFIDENCE, Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.registry import judge_all
 
 __all__ = ["all_findings"]
 
 _SAME_ORDER = 0.012
-_SURE_OF_BEARING = 0.5
 _CLEARLY_ITS_OWN = 3.0
 # What a shaft that shakes its wheel looks like to the judge of gears.
 _SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
@@ -31,13 +30,13 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     Strong impacts of one tooth, once a turn, fill the envelope with the shaft's lines; what a bearing is then
     said to have at a multiple of that speed is the tooth. A bad tooth also raises the unevenness by which
     wear is judged; the gear judge sees to that itself. So do the impacts of a bearing: beside one that is
-    surely bad nothing is said of wear.
+    told nothing is said of wear.
     """
     others = judge_all(measured)
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
     kept = [one for one in bearings if not any(_is_teeths_doing(one, tooth, measured) for tooth in teeth)]
     shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
-    knocked = any(one.confidence >= _SURE_OF_BEARING for one in kept)
+    knocked = any(one.confidence >= LEAST_CONFIDENCE for one in kept)
     others = tuple(one for one in others if not (knocked and one.fault == "gear_wear"))
     kept += [one for one in others if not (shaken and _is_shaken(one))]
     return tuple(sorted(kept, key=lambda one: -one.confidence))

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-__all__ = ["FAULT_WORDS", "Finding", "Size"]
+__all__ = ["FAULT_WORDS", "LEAST_CONFIDENCE", "Finding", "Size"]
+
+LEAST_CONFIDENCE = 0.3
+"""What is less sure is told as "doubtful_finding" in `quality`, and is no finding."""
 
 FAULT_WORDS = (
     "outer_race",

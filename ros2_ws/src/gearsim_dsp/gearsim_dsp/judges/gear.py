@@ -215,7 +215,7 @@ def _off_axis(measured: Measured, meshes: list[GearMesh]) -> list[Finding]:
         runout = wheel_runout(measured, mesh)
         if runout is None:
             continue
-        # Two wheels of one speed add up what each may have, in any phase.
+        # Two wheels that cannot be parted add up what each may have, in any phase.
         limit = _RUNOUT_OF_PITCH * (1.0 if runout.side else math.sqrt(2.0))
         if runout.share_of_pitch < limit:
             continue

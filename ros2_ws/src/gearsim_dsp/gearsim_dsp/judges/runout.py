@@ -15,6 +15,7 @@ from gearsim_io.nameplate import GearMesh
 __all__ = ["WheelRunout", "wheel_runout"]
 
 _LEAST_TURNS = 4
+_PARTED = 2.0  # lines: half the width of a Hann line at its foot
 _PER_TURN = 256
 
 
@@ -26,7 +27,8 @@ class WheelRunout:
     ----------
     shaft : str
     side : str
-        "pinion" or "gear"; empty where both wheels turn at one speed.
+        "pinion" or "gear"; empty where both wheels turn at one speed, or so nearly that the record does not
+        part their turns.
     share_of_pitch : float
         Amplitude along the pitch circle over the tooth pitch.
     over_floor : float
@@ -70,7 +72,7 @@ def wheel_runout(measured: Measured, mesh: GearMesh) -> WheelRunout | None:
         around = np.concatenate([lines[turns // 3 : turns - 2], lines[turns + 3 : 2 * turns - 2]])
         floor = float(np.median(around)) if around.size else 1e-12
         found.append((float(lines[turns - 1 : turns + 2].max()), shaft, teeth, floor))
-    twins = mesh.driving_teeth == mesh.driven_teeth
+    twins = abs(mesh.driving_teeth / mesh.driven_teeth - 1.0) * turns < _PARTED
     share, shaft, teeth, floor = max(found)
     small = min(mesh.driving_teeth, mesh.driven_teeth)
     side = "" if twins else "pinion" if teeth == small else "gear"
