@@ -102,6 +102,23 @@ def test_an_assumed_angle_follows_the_model_where_its_speed_wavers():
     assert np.max(np.abs(course - expected)[2:-2]) < 0.02  # of a wave of 0.1 Hz; one pulse per turn
 
 
+def test_a_part_of_a_run_up_keeps_the_speed_of_the_whole():
+    """Half of it is slower than its mean; that is no reason to put its lines at higher orders."""
+    case = case_of("unsw_parallel", "lpm34", dataclasses.replace(parallel_record(), tachos=()))
+    t = np.linspace(0.0, 2.0, 5)
+    run_up = 9.8 * (0.9 + 0.1 * t)
+    with Simulator(case) as simulator:
+        measured = simulator.measured[0]
+        content = scenario_content(case, measured)
+        del content["operating_point"]["speed"]
+        content["profile"] = {"trace": {"columns": {"time_s": t.tolist(), "speed_hz": run_up.tolist()}}}
+        (view,) = simulator.views({0: content}, seconds=1.0)
+    time_s, course = view.speed_course(0.1)
+    expected = np.interp(time_s, t, run_up) * measured.speed_hz / 9.8
+    # One pulse per turn; by the mean of what was simulated it would be 0.5 Hz too high.
+    assert np.max(np.abs(course - expected)[2:-2]) < 0.03
+
+
 def wave(mean_hz: float, time_s: np.ndarray) -> np.ndarray:
     return mean_hz * (1 + 0.01 * np.sin(2 * np.pi * time_s))
 

@@ -25,6 +25,7 @@ from gearsim_sim.scenario import parse_scenario
 from gearsim_sim.simulation import to_record
 from gearsim_twin.case import Case
 from gearsim_twin.load import stated_load_nm
+from gearsim_twin.stated_speed import stated_speed_hz
 from gearsim_twin.view import View
 from gearsim_twin.workers import WorkerLostError, Workers, check_stop
 
@@ -159,7 +160,8 @@ class Simulator:
         own = {**copy.deepcopy(dict(content)), "seed": seed}
         shafts = self.case.modelled.tacho_shafts
         shaft = view.machine.reference_shaft if view.machine.reference_shaft in shafts else shafts[0]
-        return _Task(own, length, view.machine, view.speed, shaft)
+        stated_hz = stated_speed_hz(own, view.record.seconds)
+        return _Task(own, length, view.machine, view.speed, shaft, stated_hz)
 
     def _made(self, tasks: Sequence[_Task], then: Callable[[View], T], refused: bool = False) -> list[Any]:
         """What is made of the views; with `refused` None where the simulator takes no such content."""
@@ -199,13 +201,17 @@ class Simulator:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """A simulation, and what is taken as the speed of the measured record that it stands for."""
+    """A simulation, and what is taken as the speed of the measured record that it stands for.
+
+    `stated_hz` is the model's own mean speed over the whole of that record, where its content tells one.
+    """
 
     content: dict[str, Any]
     seconds: float
     machine: Machine
     measured: ShaftSpeed
     angle_shaft: str
+    stated_hz: float | None
 
     @property
     def key(self) -> str:
@@ -239,7 +245,8 @@ class _Task:
         true = window_speed(record.tachos, record.sample_count, record.sample_rate_hz, self.machine)
         if true.phase is None:
             return self.measured
-        scale = self.measured.value_hz / true.value_hz
+        # Means over the whole record: a part of a run-up or of a swing has another mean on both sides alike.
+        scale = self.measured.value_hz / (self.stated_hz or true.value_hz)
         phase = Phase(true.phase.samples, true.phase.turns * scale)
         return replace(self.measured, phase=phase)
 

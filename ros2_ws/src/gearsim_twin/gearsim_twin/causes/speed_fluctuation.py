@@ -148,7 +148,10 @@ class SpeedFluctuation:
             base = np.interp(time_s, columns["time_s"], columns["speed_hz"])
         else:
             base = np.full(time_s.size, _in_hz(point["speed"]))
-        swing = 1.0 + float(values["rms_relative"]) * course_of(time_s, bandwidth)
+        course = course_of(time_s, bandwidth)
+        # The mean speed of the record is known; what swings is the rest.
+        course -= float(np.mean(course[time_s <= seconds - _MARGIN_S]))
+        swing = 1.0 + float(values["rms_relative"]) * course
         speed_hz = np.maximum(base * swing, 0.01 * base)
         profile["trace"] = {
             "columns": {
