@@ -187,6 +187,26 @@ def test_beats_of_electrical_lines_near_a_fault_order_are_not_taken_for_it():
     assert verdict_of(x[None], RATE, machine(tacho=True), Signal(x, RATE, turns).tacho()).findings == ()
 
 
+def _sharing(difference=0.005):
+    """One bearing whose elements strike that much more often than its inner race is passed."""
+    size = 0.2 - difference * 4.8 / 30  # where 4 (1 + q) and 1 / q - q are alike, 4.8
+    bearing = Bearing("twofold", "shaft", 8, 40e-3 * size, 40e-3, 0.0, False, ("ch_1",))
+    plate = replace(machine(tacho=True), bearings=(bearing,))
+    inner, rolling = (f for f in fault_families(plate) if f.fault in ("inner_race", "rolling_element"))
+    assert rolling.order / inner.order == pytest.approx(1 + difference, rel=1e-3)
+    return plate, {"inner_race": inner.order, "rolling_element": rolling.order}
+
+
+@pytest.mark.parametrize("fault", ["inner_race", "rolling_element"])
+def test_of_families_within_each_others_tolerance_that_with_the_likelier_slip_is_told(fault):
+    """Without sidebands of shaft or cage nothing else tells them apart."""
+    plate, orders = _sharing()
+    for seed in range(3):
+        made = _made(seed, orders[fault], 0.6, slip=0.002)
+        (finding,) = verdict_of(made.x[None], RATE, plate, made.tacho()).findings
+        assert finding.fault == fault
+
+
 def test_a_weak_family_is_noted_but_not_found():
     made = _made(7, BPFO, 0.17, seconds=20.0)
     verdict = verdict_of(made.x[None], RATE, machine(tacho=True), made.tacho())

@@ -69,6 +69,28 @@ def test_teeth_uneven_all_round_with_strong_harmonics_are_worn():
     assert (finding.component, finding.fault) == ("gears.pinion", "gear_wear")
 
 
+@pytest.mark.parametrize(("seconds", "side"), [(2.0, ""), (6.0, "pinion")])
+def test_wheels_of_nearly_one_speed_add_up_where_the_record_does_not_part_them(seconds, side):
+    """At 44 and 45 teeth the turns are a line apart in 45 turns; together both may have more than each."""
+    machine = gearbox(44, 45)
+    ratio, share = machine.shaft("output").ratio, 0.006
+    trains = {
+        "input": edges("input", SPEED_HZ, seconds, error=lambda t: share / 44 * np.sin(2 * np.pi * t)),
+        "output": edges(
+            "output", SPEED_HZ * ratio, seconds, error=lambda t: 0.5 * share / 45 * np.sin(2 * np.pi * t)
+        ),
+    }
+    channels = {name: np.zeros(round(seconds * 16384)) for name in ("in_y", "in_x", "out_y", "out_x")}
+    box = measured(machine, channels, steady(SPEED_HZ, seconds), trains)
+    found = wheel_runout(box, machine.gear_meshes[0])
+    assert found.side == side
+    if side:
+        assert found.share_of_pitch == pytest.approx(share, rel=0.02)
+    else:
+        assert 0.0075 < found.share_of_pitch < 1.5 * share
+    assert "gear_eccentricity" not in [f.fault for f in judge_gears(box)]
+
+
 def test_nothing_is_judged_without_the_angle_or_with_few_turns():
     machine = gearbox()
     channels = {name: x[: 16384 // 4] for name, x in signals(1, machine, tooth_of="input").items()}

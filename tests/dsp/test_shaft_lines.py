@@ -52,6 +52,25 @@ def test_an_outer_race_passed_five_times_a_turn_is_found_among_the_shafts_lines(
         assert finding.evidence["covered_by"] == "5 x shaft"
 
 
+def test_harmonics_that_are_parted_prove_a_race_whose_first_ones_are_not():
+    """Sidebands of a narrow load zone raise all of the shaft's lines, against which the race is nothing."""
+    order, elements = 5.985, 10
+    size = order / (0.5 * elements) - 1.0
+    bearing = Bearing("bearing_1", "shaft", elements, 40e-3 * size, 40e-3, 0.0, False, ("ch_1",))
+    plate = replace(machine(SPEED, tacho=True), bearings=(bearing,))
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        turns = turns_of(SPEED, 4.0, RATE)
+        zone = np.exp(-0.5 * ((np.mod(turns, 1.0) - 0.5) / 0.15) ** 2)
+        x = defect(rng, turns, RATE, order, slip=0.0).x * zone
+        (finding,) = _verdict(
+            noise(rng, turns.size) + 1.5 * x / np.sqrt(np.mean(x**2)), turns, plate
+        ).findings
+        assert finding.fault == "inner_race"
+        assert finding.evidence["covered_by"] == "6 x shaft"
+        assert finding.evidence["dominance"] > 20.0
+
+
 def test_impacts_once_a_turn_and_low_harmonics_are_not_taken_for_it():
     """A bad tooth has all harmonics alike; runout and couplings the low ones."""
     for seed in range(4):
