@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from bearing_signals import defect, machine, noise, rotating_lines, turns_of
 
+from gearsim_dsp import diagnose
 from gearsim_dsp.diagnose import diagnose_record
+from gearsim_dsp.judges.bearing import find_faults
 from gearsim_dsp.kinematics import fault_families
+from gearsim_dsp.speed import nameplate_speed
+from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor
+from gearsim_dsp.streams.kurtosis_monitor import KurtosisMonitor
 from gearsim_dsp.streams.window_speeds import KnownSpeeds
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import GearMesh, Machine, Shaft
@@ -84,7 +89,31 @@ def test_a_tacho_that_is_missing_pulses_and_jitters_is_mended():
 
 
 def test_known_speeds_need_a_phase():
-    from gearsim_dsp.speed import nameplate_speed
-
     with pytest.raises(InputError, match="phase"):
         KnownSpeeds(nameplate_speed(_plate()), 0)
+
+
+def test_a_second_look_with_the_speed_of_the_record_repeats_only_what_needs_a_speed(monkeypatch):
+    """Where the windows do not tell the speed, the envelope is taken anew; impacts are counted once."""
+    looks = {"envelope": 0, "kurtosis": 0, "verdicts": 0}
+
+    def counted(name, original):
+        def judge(self, window):
+            looks[name] += 1
+            return original(self, window)
+
+        return judge
+
+    def untold(plate, pool):
+        looks["verdicts"] += 1
+        verdict = find_faults(plate, pool)
+        return replace(verdict, speed=nameplate_speed(plate)) if looks["verdicts"] == 1 else verdict
+
+    monkeypatch.setattr(EnvelopeMonitor, "judge", counted("envelope", EnvelopeMonitor.judge))
+    monkeypatch.setattr(KurtosisMonitor, "judge", counted("kurtosis", KurtosisMonitor.judge))
+    monkeypatch.setattr(diagnose, "find_faults", untold)
+    x, _ = _signal(6, [25.2, 25.2], faulty=True)
+    diagnosis = diagnose_record(_record(x), _plate())
+    assert looks["verdicts"] == 2
+    assert looks["envelope"] == 2 * looks["kurtosis"] > 0
+    assert [f.fault for f in diagnosis.findings if f.component == "bearing_1"] == ["outer_race"]

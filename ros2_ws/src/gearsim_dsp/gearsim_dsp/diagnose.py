@@ -186,15 +186,15 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
     if listed and not listed & set(record.channels):
         expected = "a channel of the machine: " + ", ".join(sorted(listed))
         raise InputError(record.source or "record", "channels", ", ".join(record.channels), expected)
-    window = _window(record, plate, settings)
     angle = record_speed(record, plate)
+    window = _window(record, plate, settings, angle.speed)
     known = KnownSpeeds(angle.speed, record.first_sample) if angle.speed is not None else None
     speeds = known if known is not None and angle.replaces_angle else LiveSpeeds(plate, follow=False)
     pool, reports, impulsive = _by_windows(record, plate, speeds, window, settings.batch_samples)
     verdict = find_faults(plate, pool)
     if verdict.speed.source == "nameplate" and known is not None and speeds is not known:
-        # Single windows do not tell the speed, but the whole record does.
-        pool, reports, impulsive = _by_windows(record, plate, known, window, settings.batch_samples)
+        # Single windows do not tell the speed, but the whole record does; how impulsive they are stays.
+        pool, reports, _ = _by_windows(record, plate, known, window, settings.batch_samples, impulses=False)
         verdict = find_faults(plate, pool)
     speed = angle.speed or verdict.speed
     # Where no window could be judged, the speed of the record is known all the same.
@@ -230,9 +230,17 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
 
 
 def _by_windows(
-    record: Record, plate: Machine, speeds: WindowSpeeds, window: WindowSettings, batch_samples: int
+    record: Record,
+    plate: Machine,
+    speeds: WindowSpeeds,
+    window: WindowSettings,
+    batch_samples: int,
+    impulses: bool = True,
 ) -> tuple[EvidencePool, list[Report], list[Report]]:
-    """Evidence of all windows together, and the reports of the envelope and the kurtosis monitor on each."""
+    """Evidence of all windows together, and the reports of the envelope monitor on each.
+
+    With `impulses` also those of the kurtosis monitor, which needs no speed.
+    """
     settings = EnvelopeSettings(window, size_every=0, between=True)
     envelope = EnvelopeMonitor(plate, settings, speeds=speeds, by_window=False)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
@@ -243,7 +251,8 @@ def _by_windows(
         report = envelope.judge(one)
         pool.add(report.results)
         reports.append(replace(report, results=()))  # or memory would grow with the record
-        impulsive.append(kurtosis.judge(one))
+        if impulses:
+            impulsive.append(kurtosis.judge(one))
     return pool, reports, impulsive
 
 
@@ -267,13 +276,17 @@ def _judged_parts(measured: Measured, verdict: Verdict) -> tuple[str, ...]:
     return tuple(parts)
 
 
-def _window(record: Record, machine: Machine, settings: DiagnosisSettings) -> WindowSettings:
+def _window(
+    record: Record, machine: Machine, settings: DiagnosisSettings, known: ShaftSpeed | None
+) -> WindowSettings:
     """Windows of the length asked for, at most the record's, overlapping by three quarters."""
     length = settings.window_s
     if np.isfinite(machine.nominal_speed_hz):
         slowest = min((machine.shaft(one.shaft).ratio for one in machine.bearings), default=1.0)
         length = max(length, settings.least_turns / (slowest * machine.nominal_speed_hz))
-        length = max(length, least_window_s(machine.nominal_speed_hz) if machine.bearings else 0.0)
+    speed_hz = machine.nominal_speed_hz if known is None else known.value_hz
+    if machine.bearings and np.isfinite(speed_hz):
+        length = max(length, least_window_s(speed_hz))
     length = float(np.clip(length, LEAST_WINDOW_S, 60.0))
     if record.seconds < length:
         length = max(LEAST_WINDOW_S, np.floor(record.sample_count * 0.999) / record.sample_rate_hz)
