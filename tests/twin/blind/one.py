@@ -1,0 +1,83 @@
+"""Makes, judges and scores one case, and prints the result as one JSON object.
+
+python -m blind.one SEED INDEX [--workers N] [--cache DIR] [--limit SECONDS]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import secrets
+import sys
+import tempfile
+import time
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blind.detector import THRESHOLD_DB, largest_db
+from blind.judging import judge
+from blind.making import hidden, make, write
+from blind.plan import Planned, planned
+from blind.rigs import RIGS
+from blind.scoring import score
+
+
+def run(seed: int, index: int, workers: int, cache: Path | None, limit_s: float) -> dict[str, Any]:
+    """The result of a case; what goes wrong is told as `failed`."""
+    plan = planned(seed, index)
+    result: dict[str, Any] = {**asdict(plan), "severity": plan.severity}
+    with tempfile.TemporaryDirectory(prefix="records-") as name:
+        folder = Path(name) if cache is None else cache / f"{seed}-{index}"
+        began = time.process_time()
+        places, truth, secret = _records(plan, folder)
+        result |= {"truth": truth, "made_s": round(time.process_time() - began, 1)}
+        judged = judge(places, RIGS[plan.rig], [secret], workers, limit_s)
+        result |= {"wall_s": round(judged.wall_s, 1), "cpu_s": round(judged.cpu_s, 1)}
+        if judged.verdict is None:
+            return {**result, "failed": judged.said}
+        result["score"] = score(truth, plan.kind, judged.verdict)
+        result["verdict"] = judged.verdict
+        largest = largest_db(places, RIGS[plan.rig])
+        result["detector"] = {"largest_db": largest, "alarm": largest > THRESHOLD_DB[plan.rig]}
+    return result
+
+
+def _records(plan: Planned, folder: Path) -> tuple[list[Path], dict[str, Any], Path]:
+    """Records, the truth, and the folder where that is kept: apart, under a name that nobody is told."""
+    done = sorted(folder.parent.glob(f".{folder.name}-*/truth.json")) if folder.exists() else []
+    if done:
+        return sorted(folder.glob("run_*")), json.loads(done[0].read_text(encoding="utf-8")), done[0].parent
+    rng = np.random.default_rng([plan.seed, plan.index, 1])
+    made = make(hidden(plan.rig, plan.effects, rng), (plan.seed, plan.index))
+    folder.mkdir(parents=True, exist_ok=True)
+    places = write(made, folder)
+    secret = folder.parent / f".{folder.name}-{secrets.token_hex(8)}"
+    secret.mkdir(mode=0o700)
+    truth = json.loads(json.dumps(made.truth))
+    (secret / "truth.json").write_text(json.dumps(truth), encoding="utf-8")
+    return places, truth, secret
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("seed", type=int)
+    parser.add_argument("index", type=int)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--cache", type=Path)
+    parser.add_argument("--limit", type=float, default=900.0)
+    given = parser.parse_args()
+    try:
+        result = run(given.seed, given.index, given.workers, given.cache, given.limit)
+    except Exception as error:
+        traceback.print_exc(file=sys.stderr)
+        result = {**asdict(planned(given.seed, given.index)), "failed": f"{type(error).__name__}: {error}"}
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()
