@@ -39,6 +39,23 @@ def test_what_runs_follows_from_the_options(tmp_path):
     assert waiting == {"exporter": None, "mqtt": None, "trend": None, "envelope": 6, "kurtosis": 6, "gear": 6}
 
 
+def test_a_twin_runs_where_it_is_given_a_model(tmp_path):
+    scenario = tmp_path / "extended.yaml"
+    scenario.write_text("machine: unsw_parallel\n")
+    usual = ",".join(MONITORS)
+    for given, model in (("lpm34", "lpm34"), (str(scenario), str(scenario))):
+        found = choose(usual, "none", None, None, tmp_path, 30.0, given)
+        assert found.monitors == (*MONITORS, "twin")
+        assert found.listeners == 3
+        (spec,) = [each for each in found.specs(alarm_listeners=1) if each.name == "twin"]
+        assert spec.module == "gearsim_twin.nodes.twin"
+        learning = {"baseline_dir": str(tmp_path), "learn_s": 30.0}
+        assert spec.parameters == {"latch": "none", "alarm_listeners": 2, **learning, "model": model}
+    assert "twin" not in choose("all", "none", None, None).monitors  # it needs a model
+    with pytest.raises(InputError, match=re.escape("got nonsense")):
+        choose(usual, "none", None, None, twin="nonsense")
+
+
 @pytest.mark.parametrize(
     ("text", "address"),
     [
@@ -119,7 +136,7 @@ TASKS = {
     "exporter": ("serving",),
     "mqtt": ("broker",),
     **dict.fromkeys(MONITORS, ("stream", "machine", "alarms")),
-    **dict.fromkeys(("gear", "trend"), ("stream", "machine", "alarms", "baseline")),
+    **dict.fromkeys(("gear", "trend", "twin"), ("stream", "machine", "alarms", "baseline")),
 }
 
 

@@ -35,4 +35,5 @@ setup(
         f"gearsim_dsp=={VERSION}",
     ],
     zip_safe=False,
+    entry_points={"console_scripts": ["twin = gearsim_twin.nodes.twin:main"]},
 )

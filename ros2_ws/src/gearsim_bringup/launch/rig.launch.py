@@ -2,6 +2,7 @@
 
 ros2 launch gearsim_bringup rig.launch.py scenario:=demo bag:=/tmp/demo_bag
 ros2 launch gearsim_bringup rig.launch.py scenario:=gear_wear gear:=true trend:=true exporter:=true
+ros2 launch gearsim_bringup rig.launch.py scenario:=demo twin:=lpm34
 """
 
 from launch import LaunchDescription
@@ -29,6 +30,7 @@ def generate_launch_description():
         ),
         DeclareLaunchArgument("gear", default_value="false", description="judge gears against a baseline"),
         DeclareLaunchArgument("trend", default_value="false", description="follow all indicators"),
+        DeclareLaunchArgument("twin", default_value="", description="model to run beside, such as lpm34"),
         DeclareLaunchArgument("exporter", default_value="false", description="metrics at 127.0.0.1:9812"),
         DeclareLaunchArgument("mqtt", default_value="false", description="to the broker at 127.0.0.1:1883"),
     ]
@@ -67,4 +69,13 @@ def generate_launch_description():
         parameters=[{"bag": bag}],
         condition=IfCondition(PythonExpression(["'", bag, "' != ''"])),
     )
-    return LaunchDescription([*arguments, recorder, *asked_for, *monitors, simulator])
+    model = LaunchConfiguration("twin")
+    twin = Node(
+        package="gearsim_twin",
+        executable="twin",
+        namespace=namespace,
+        output="screen",
+        parameters=[{"model": ParameterValue(model, value_type=str)}],
+        condition=IfCondition(PythonExpression(["'", model, "' != ''"])),
+    )
+    return LaunchDescription([*arguments, recorder, *asked_for, twin, *monitors, simulator])

@@ -19,7 +19,7 @@ from gearsim_twin.case import Case
 from gearsim_twin.load import stated_force_n
 from gearsim_twin.view import View
 
-__all__ = ["follows_speed", "machine_word", "scenario_content"]
+__all__ = ["follows_speed", "machine_word", "scenario_content", "speed_trace"]
 
 _RIG = "bearing_rig"
 # A change of speed is an operating condition where means over a quarter of the record show it, by more than
@@ -69,7 +69,7 @@ def scenario_content(case: Case, view: View) -> dict[str, Any]:
     }
     if follows_speed(view):
         del content["operating_point"]["speed"]
-        content["profile"] = {"trace": _trace(view)}
+        content["profile"] = {"trace": speed_trace(view)}
     force_n = stated_force_n(view.record)
     if force_n is not None and case.modelled.kind == _RIG:
         content["parameters"] = {"radial_load": _number(force_n, "N")}
@@ -149,7 +149,7 @@ def _whole(value: float) -> bool:
     return value >= 1 and value == round(value)
 
 
-def _trace(view: View) -> dict[str, Any]:
+def speed_trace(view: View) -> dict[str, Any]:
     """The slow course of the speed as points of a scenario's trace, from the first sample to the last."""
     seconds = view.record.seconds
     step_s = max(seconds / _POINTS, _LEAST_TURNS / view.speed_hz)

@@ -15,6 +15,7 @@ EXAMPLE = """
 ./gearsim play out/my_bag
 ./gearsim play out/my_bag --rate 4 --diagnose
 ./gearsim play out/my_bag --diagnose --monitors all --prometheus 9812
+./gearsim play out/my_bag --twin out/twin_1/extended.yaml
 """
 
 
@@ -33,11 +34,11 @@ def command(
 ) -> int:
     """Play a BAG on the topics it was recorded from, with /clock.
 
-    With --diagnose the bag's own features, spectra and alarms are left out: the nodes make new ones.
+    With --diagnose or --twin the bag's own features, spectra and alarms are left out: nodes make new ones.
     """
     from gearsim_bringup.live import player
 
-    if not diagnose:
+    if not (diagnose or choice.model):
         from gearsim_io.nodes.player import main
 
         spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)

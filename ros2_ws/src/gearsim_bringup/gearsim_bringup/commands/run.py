@@ -18,6 +18,7 @@ EXAMPLE = """
 ./gearsim run healthy
 ./gearsim run demo --seconds 30 --record out/my_bag --view out/my_run.rrd
 ./gearsim run gear_wear --monitors all --latch error --prometheus 9812 --mqtt 127.0.0.1
+./gearsim run demo --twin lpm34 --learn 60
 """
 
 
@@ -52,6 +53,7 @@ def command(
             refuse_existing(path, f"the name of a new {what}")
     loaded = load_scenario(scenario)
     from gearsim_bringup.live import LiveRun, simulator  # after what can be refused at once
+    from gearsim_bringup.reach import reach_lines
 
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)
@@ -60,6 +62,8 @@ def command(
     custom: dict[str, Any] = {"scenario": loaded.name, "seed": str(loaded.seed)}
     with tempfile.TemporaryDirectory(prefix="gearsim_run_") as logs:
         voice.say(f"scenario {loaded.name}: {loaded.description}".rstrip(": "))
+        for line in reach_lines(loaded, choice.monitors):
+            voice.say(line)
         tell_first_use(voice)
         voice.say("topics under /gearsim; Ctrl-C ends the run")
         try:

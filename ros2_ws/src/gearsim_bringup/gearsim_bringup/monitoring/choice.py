@@ -8,23 +8,27 @@ from pathlib import Path
 from gearsim_bringup.processes import NodeSpec
 from gearsim_io.errors import InputError
 
-__all__ = ["ALL_MONITORS", "MONITORS", "Choice", "choose"]
+__all__ = ["ALL_MONITORS", "MONITORS", "TWIN", "Choice", "choose"]
 
 MONITORS = ("envelope", "kurtosis")
 """Nodes that run unless others are asked for: they judge by themselves, without a learnt baseline."""
 
 ALL_MONITORS = (*MONITORS, "gear", "trend")
+TWIN = "twin"
+"""Node that runs where a model is given to run beside the stream."""
 _OF_RESULTS = ("trend",)
-_LEARNING = ("gear", "trend")
+_LEARNING = ("gear", "trend", TWIN)
+_MODULES = {TWIN: "gearsim_twin.nodes.twin"}
 EXPORTER_PORT, MQTT_PORT = 9812, 1883
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Diagnostic nodes of `ALL_MONITORS`, which of their levels latch, and addresses of the stacks.
+    """Diagnostic nodes of `ALL_MONITORS` and `TWIN`, which levels latch, and addresses of the stacks.
 
     `prometheus` is where the exporter listens, `mqtt` where the broker is: (host, port). `baselines` is the
-    folder of learnt baselines and `learn_s` how long to learn; empty and 0: as the nodes have it.
+    folder of learnt baselines and `learn_s` how long to learn; empty and 0: as the nodes have it. `model` is
+    what the twin runs: the name of a model, or a scenario.
     """
 
     monitors: tuple[str, ...] = MONITORS
@@ -33,6 +37,7 @@ class Choice:
     mqtt: tuple[str, int] | None = None
     baselines: str = ""
     learn_s: float = 0.0
+    model: str = ""
 
     @property
     def listeners(self) -> int:
@@ -57,7 +62,10 @@ class Choice:
                 values: dict[str, str | int] = {"host": address[0], "port": address[1]}
                 found.append(NodeSpec(name, f"gearsim_bringup.monitoring.nodes.{name}", values))
         order = sorted(self.monitors, key=lambda name: name not in _OF_RESULTS)
-        return found + [NodeSpec(n, f"gearsim_dsp.nodes.{n}", self._parameters(n, everyone)) for n in order]
+        return found + [
+            NodeSpec(n, _MODULES.get(n, f"gearsim_dsp.nodes.{n}"), self._parameters(n, everyone))
+            for n in order
+        ]
 
     def _parameters(self, name: str, alarm_listeners: int) -> dict[str, str | float]:
         parameters: dict[str, str | float] = {"latch": self.latch}
@@ -67,6 +75,8 @@ class Choice:
             parameters["baseline_dir"] = self.baselines
         if name in _LEARNING and self.learn_s:
             parameters["learn_s"] = float(self.learn_s)
+        if name == TWIN:
+            parameters["model"] = self.model
         return parameters
 
 
@@ -77,26 +87,37 @@ def choose(
     mqtt: str | None,
     baselines: Path | None = None,
     learn_s: float | None = None,
+    twin: str | None = None,
 ) -> Choice:
     """What was asked for on the command line.
 
     Raises
     ------
     InputError
-        For a node that there is not, or an address that is none.
+        For a node or a model that there is not, or an address that is none.
     """
     names = ALL_MONITORS if monitors == "all" else tuple(dict.fromkeys(monitors.replace(" ", "").split(",")))
     for name in names:
         if name not in ALL_MONITORS:
             raise InputError("--monitors", "", name, f"all, or some of {', '.join(ALL_MONITORS)}")
+    model = "" if twin is None else _model(twin)
     return Choice(
-        names,
+        (*names, TWIN) if model else names,
         latch,
         None if prometheus is None else _address(prometheus, "--prometheus", EXPORTER_PORT),
         None if mqtt is None else _address(mqtt, "--mqtt", MQTT_PORT),
         "" if baselines is None else str(baselines.absolute()),
         learn_s or 0.0,
+        model,
     )
+
+
+def _model(text: str) -> str:
+    """The name of a model, or the file of a scenario wherever the node runs."""
+    from gearsim_sim.models import MODELS
+    from gearsim_sim.scenario import scenario_file
+
+    return text if text in MODELS else str(scenario_file(text).absolute())
 
 
 def _address(text: str, where: str, usual: int) -> tuple[str, int]:

@@ -13,7 +13,7 @@ from gearsim_bringup.options import ANY_PATH, POSITIVE
 
 __all__ = ["monitor_options"]
 
-_NAMES = ("monitors", "latch", "prometheus", "mqtt", "baselines", "learn_s")
+_NAMES = ("monitors", "latch", "prometheus", "mqtt", "baselines", "learn_s", "twin")
 
 _OPTIONS = (
     click.option(
@@ -31,8 +31,13 @@ _OPTIONS = (
     ),
     click.option("--prometheus", metavar="[HOST:]PORT", help="Serve metrics for Prometheus there."),
     click.option("--mqtt", metavar="HOST[:PORT]", help="Pass features and alarms on to this MQTT broker."),
-    click.option("--baselines", type=ANY_PATH, help="Folder of learnt baselines (gear, trend)."),
+    click.option("--baselines", type=ANY_PATH, help="Folder of learnt baselines (gear, trend, twin)."),
     click.option("--learn", "learn_s", type=POSITIVE, help="Seconds of signal to learn a baseline from."),
+    click.option(
+        "--twin",
+        metavar="MODEL",
+        help="Run this model beside the samples: a name such as lpm34, or a scenario such as extended.yaml.",
+    ),
 )
 
 

@@ -71,6 +71,8 @@ KINDS: tuple[tuple[str, FeatureKind], ...] = (
     ("mesh_level", FeatureKind(ratio=True, least=6 * _DB)),
     ("residual_rms", FeatureKind(ratio=True, least=6 * _DB)),
     ("shaft_order_*", FeatureKind(ratio=True, least=6 * _DB)),
+    # Of the live twin, in dB: what a model misses may as well become less.
+    ("*_residual", FeatureKind(ratio=False, least=6.0, falls=True)),
 )
 """Pattern of the name, and the kind; the first that fits counts. What fits none is followed, not judged."""
 

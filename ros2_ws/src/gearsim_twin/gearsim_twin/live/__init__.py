@@ -1,0 +1,1 @@
+"""The live twin: a model beside a stream, window by window."""
