@@ -21,7 +21,14 @@ setup(
     python_requires=">=3.11",
     packages=find_packages(),
     package_data={
-        NAME: ["scenarios/*.yaml", "scenarios/*.csv", "sensors/*.yaml", "sensors/catalogue/*/*.yaml"]
+        NAME: [
+            "scenarios/*.yaml",
+            "scenarios/*.csv",
+            "sensors/*.yaml",
+            "sensors/catalogue/*/*.yaml",
+            "model/casing/descriptions/*.*",
+            "model/casing/reduced_files/*.npz",
+        ]
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -37,6 +44,8 @@ setup(
         "ruamel.yaml>=0.18",
         f"gearsim_io=={VERSION}",
     ],
+    # What reads Nastran's matrices of a casing of one's own.
+    extras_require={"nastran": ["pyyeti>=1.4.7"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -38,6 +38,7 @@ COMMANDS = {
     "view": "view",
     "monitoring": "monitoring",
     "bench": "bench",
+    "casing": "casing",
     "gallery": "gallery",
     "figures": "figures",
     "evaluate": "evaluate",

@@ -88,6 +88,7 @@ def finish(
             "displacements": structure.size,
             "modes": modes,
             "cutoff_hz": reduction.cutoff_hz,
+            "residual_vectors": reduction.residuals,
             "accuracy": ACCURACY,
             "damping_ratio": damping_ratio,
         },

@@ -26,6 +26,7 @@ from gearsim_io.errors import InputError
 Array = NDArray[np.float64]
 
 FORMAT = 1
+SHIPPED = Path(__file__).with_name("reduced_files")
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
@@ -118,6 +119,18 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float) -> Array:
     half = mass @ shapes
     matrix = (half * (2 * ratio * np.sqrt(np.maximum(squares, 0.0)))) @ half.T
     return np.asarray((matrix + matrix.T) / 2)
+
+
+def find_reduced(name_or_path: str) -> ReducedCasing:
+    """The reduced casing shipped under a name, or in a file of one's own (.npz)."""
+    path = Path(name_or_path)
+    if path.suffix == ".npz":
+        return load_reduced(path)
+    known = sorted(file.stem for file in SHIPPED.glob("*.npz"))
+    if name_or_path not in known:
+        expected = f"one of {', '.join(known)}, or the path of a .npz file"
+        raise InputError("reduced casing", "", name_or_path, expected)
+    return load_reduced(SHIPPED / f"{name_or_path}.npz")
 
 
 def save_reduced(casing: ReducedCasing, path: Path) -> None:

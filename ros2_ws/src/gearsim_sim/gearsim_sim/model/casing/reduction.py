@@ -1,18 +1,13 @@
 """Craig-Bampton reduction: exact in statics and rigid-body motion, with a few modes for the rest.
 
 Craig and Bampton (1968). With masters m held, the remaining displacements are
-`u_s = Psi u_m + Phi q`: Psi the static shapes of unit master displacements, Phi the lowest modes. What the
-modes left out would add follows the masters' acceleration without delay at low frequency,
-`- D u_m''` with `D = K_ss^-1 A - Phi Lambda^-1 Phi' A` and `A = M_sm + M_ss Psi`: the correction of sensors.
+`u_s = Psi u_m + Phi q`: Psi the static shapes of unit master displacements, Phi the lowest modes and, among
+the number of modes asked for, some residual vectors (see `follow`). What is left out follows the masters'
+acceleration without delay at low frequency, `- D u_m''` with `D = K_ss^-1 A - Phi Lambda^-1 Phi' A` and
+`A = M_sm + M_ss Psi`: the correction of sensors.
 
-The same D tells how good the reduction is. A mode of the reduced structure with eigenvalue `lambda` and unit
-modal mass misses, to first order in what was left out, at most
-
-    d lambda / lambda = lambda u_m' (A' D) u_m / (1 - lambda / lambda_c)
-
-where lambda_c is the first mode left out: every left-out mode adds `lambda^2 (a_d' u_m)^2 /
-(lambda_d - lambda)`, and none has `lambda_d` below lambda_c. `valid_hz` is the frequency up to which half of
-that (the error of the frequency) stays below `ACCURACY`.
+How many residual vectors there are is chosen so that the reduction is valid as far up as possible: to the
+first own frequency whose estimated error exceeds `ACCURACY`, or to the first mode left out.
 """
 
 from __future__ import annotations
@@ -22,19 +17,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from scipy.sparse import csc_array, csr_array
 
 from gearsim_io.errors import InputError
-from gearsim_sim.model.casing.eigen import lowest_modes
+from gearsim_sim.model.casing.eigen import lowest_modes, signs
+from gearsim_sim.model.casing.follow import Leftover, reduced_modes
 from gearsim_sim.model.casing.held import held_factor
 from gearsim_sim.model.casing.material import Array
 from gearsim_sim.model.casing.shell import Cells
 from gearsim_sim.model.casing.structure import Structure
 
-ACCURACY = 0.006
+# Largest error of an own frequency, relative, up to each frequency [Hz]; the last one holds beyond too.
+ACCURACY = ((1000.0, 0.001), (2000.0, 0.003), (4000.0, 0.006))
 
 Tell = Callable[[str, float], None]
+
+
+def allowed_errors(frequencies_hz: Array) -> Array:
+    """The largest relative error that `ACCURACY` allows at each frequency."""
+    steps, limits = (np.array(column) for column in zip(*ACCURACY, strict=True))
+    step = np.searchsorted(steps, frequencies_hz, side="right")
+    return np.asarray(limits[np.minimum(step, len(limits) - 1)])
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ class Reduction:
     stiffness: Array
     cutoff_hz: float
     """Of the first mode left out, masters held."""
+    residuals: int
+    """How many of the modes are residual vectors: the last ones."""
     frequencies_hz: Array
     """Own frequencies of the reduced structure."""
     errors: Array
@@ -77,7 +82,12 @@ class Reduction:
         return whole
 
 
-def craig_bampton(structure: Structure, modes: int, tell: Tell = lambda _step, _done: None) -> Reduction:
+def craig_bampton(
+    structure: Structure,
+    modes: int,
+    tell: Tell = lambda _step, _done: None,
+    residuals: int | None = None,
+) -> Reduction:
     """Reduce a structure to its masters and `modes` modes.
 
     Parameters
@@ -86,6 +96,8 @@ def craig_bampton(structure: Structure, modes: int, tell: Tell = lambda _step, _
     modes : int
     tell : callable
         Hears which step begins and what share of the work (about) is done.
+    residuals : int, optional
+        How many of the modes are residual vectors; by default what serves best.
 
     Raises
     ------
@@ -103,33 +115,103 @@ def craig_bampton(structure: Structure, modes: int, tell: Tell = lambda _step, _
     static = -factor.solve(parts.k_sm)
     tell("modes", 0.2)
     squares, shapes = lowest_modes(parts.k_ss, parts.m_ss, modes + 1, factor=factor)
-    tell("corrections", 0.9)
-    kept, shapes = squares[:modes], shapes[:, :modes]
-    coupling = parts.m_sm + parts.m_ss @ static
-    follow = shapes.T @ coupling
-    delayed = factor.solve(coupling) - shapes @ (follow / kept[:, None])
-    # Rounding leaves some of the kept modes in it.
-    delayed -= shapes @ (shapes.T @ (parts.m_ss @ delayed))
-    mass, stiffness = parts.reduced(static, coupling, follow, kept)
-    lowest, own = scipy.linalg.eigh(stiffness, mass)
-    missed = _estimate(lowest, own[: len(held)], coupling.T @ delayed, float(squares[modes]))
-    frequencies = np.sqrt(np.maximum(lowest, 0)) / (2 * np.pi)
-    cutoff = float(np.sqrt(squares[modes]) / (2 * np.pi))
-    bad = np.flatnonzero(~(missed <= ACCURACY))
-    return Reduction(
-        masters=tuple(structure.masters),
-        mass=mass,
-        stiffness=stiffness,
-        cutoff_hz=cutoff,
-        frequencies_hz=frequencies,
-        errors=missed,
-        valid_hz=min(cutoff, float(frequencies[bad[0]])) if len(bad) else cutoff,
-        held=held,
-        others=others,
-        static=static,
-        shapes=shapes,
-        delayed=-delayed,
-    )
+    tell("residual vectors", 0.9)
+    work = _Work(parts, static, squares, shapes, factor)
+    counts = range(0, min(len(held), modes // 2) + 1, 2) if residuals is None else (residuals,)
+    best = max((work.choice(count) for count in counts), key=lambda choice: choice.valid)
+    return work.finish(structure, held, others, best)
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """A reduction with some number of residual vectors."""
+
+    kept: int
+    combinations: Array
+    mass: Array
+    stiffness: Array
+    errors: Array
+    squares: Array
+    cutoff: float
+
+    @property
+    def valid(self) -> float:
+        """Eigenvalue up to which it holds."""
+        frequencies = np.sqrt(np.maximum(self.squares, 0)) / (2 * np.pi)
+        bad = np.flatnonzero(~(self.errors <= allowed_errors(frequencies)))
+        return min(self.cutoff, float(self.squares[bad[0]])) if len(bad) else self.cutoff
+
+
+class _Work:
+    """What all choices of residual vectors share."""
+
+    def __init__(self, parts: _Parts, static: Array, squares: Array, shapes: Array, factor: Any) -> None:
+        self.parts, self.static, self.squares, self.shapes = parts, static, squares, shapes
+        self.modes = len(squares) - 1
+        coupling = parts.m_sm + parts.m_ss @ static
+        self.coupling = coupling
+        self.pull = shapes.T @ coupling
+        self.rest = self._without_modes(factor.solve(coupling), shapes)
+        moved = parts.m_ss @ self.rest
+        again = self._without_modes(factor.solve(moved), shapes)
+        # Here all modes found are taken away, the one beyond those asked for too.
+        self.leftover = Leftover(
+            _even(coupling.T @ self.rest), _even(moved.T @ self.rest), _even(moved.T @ again), np.inf
+        )
+
+    def _without_modes(self, columns: Array, shapes: Array) -> Array:
+        for _ in range(2):  # once more, for what rounding leaves
+            columns = columns - shapes @ (shapes.T @ (self.parts.m_ss @ columns))
+        return np.asarray(columns)
+
+    def choice(self, residuals: int) -> _Choice:
+        kept = self.modes - residuals
+        out = self.squares[kept:], self.pull[kept:]
+        left = self.leftover.without(*out)
+        m_bb, k_bb = self.parts.boundary(self.static, self.coupling)
+        combinations, own = left.combinations(self._importance(m_bb, k_bb, kept), residuals)
+        if len(own) < residuals:  # there are no more that are independent: true modes take their places
+            return self.choice(len(own))
+        follow = np.vstack([self.pull[:kept], (left.stiffness @ combinations).T])
+        mass, stiffness = _blocks(m_bb, k_bb, follow, np.concatenate([self.squares[:kept], own]))
+        squares, vectors = reduced_modes(mass, stiffness)
+        count = len(m_bb)
+        errors = left.errors(squares, vectors[:count], vectors[count + kept :], combinations)
+        return _Choice(kept, combinations, mass, stiffness, errors, squares, left.cutoff)
+
+    def _importance(self, m_bb: Array, k_bb: Array, kept: int) -> Array:
+        """Motions of the masters in own modes without residual vectors, scaled so that errors count alike."""
+        squares, vectors = reduced_modes(*_blocks(m_bb, k_bb, self.pull[:kept], self.squares[:kept]))
+        inside = (squares > 0) & (squares < self.squares[kept])
+        return np.asarray(vectors[: len(m_bb), inside] * np.sqrt(squares[inside]))
+
+    def finish(self, structure: Structure, held: Cells, others: Cells, choice: _Choice) -> Reduction:
+        kept, combinations = choice.kept, choice.combinations
+        out = self.shapes[:, kept:]
+        rest = self.rest + out @ (self.pull[kept:] / self.squares[kept:, None])
+        vectors = rest @ combinations
+        turned = signs(vectors) if vectors.size else np.ones(0)
+        factors = np.concatenate([np.ones(len(held) + kept), turned])
+        shapes = np.hstack([self.shapes[:, :kept], vectors * turned])
+        mass = choice.mass * factors[:, None] * factors
+        count = len(held)
+        own = np.diag(choice.stiffness)[count + kept :]
+        delayed = rest - vectors @ (vectors.T @ self.coupling / own[:, None])
+        return Reduction(
+            masters=tuple(structure.masters),
+            mass=mass,
+            stiffness=choice.stiffness,
+            cutoff_hz=float(np.sqrt(choice.cutoff) / (2 * np.pi)),
+            residuals=combinations.shape[1],
+            frequencies_hz=np.sqrt(np.maximum(choice.squares, 0)) / (2 * np.pi),
+            errors=choice.errors,
+            valid_hz=float(np.sqrt(choice.valid) / (2 * np.pi)),
+            held=held,
+            others=others,
+            static=self.static,
+            shapes=shapes,
+            delayed=-delayed,
+        )
 
 
 class _Parts:
@@ -142,25 +224,23 @@ class _Parts:
         self.k_sm, self.m_sm = k_s[:, held].toarray(), m_s[:, held].toarray()
         self.k_mm, self.m_mm = stiffness[held][:, held].toarray(), mass[held][:, held].toarray()
 
-    def reduced(self, static: Array, coupling: Array, follow: Array, kept: Array) -> tuple[Array, Array]:
-        """Mass and stiffness; their parts that are one or zero are so exactly (thesis 4.3.2, step 6)."""
-        masters, count = len(self.k_mm), len(self.k_mm) + len(kept)
-        mass, stiffness = np.zeros((count, count)), np.zeros((count, count))
-        m_bb = self.m_mm + self.m_sm.T @ static + static.T @ coupling
-        k_bb = self.k_mm + self.k_sm.T @ static
-        mass[:masters, :masters] = (m_bb + m_bb.T) / 2
-        stiffness[:masters, :masters] = (k_bb + k_bb.T) / 2
-        mass[masters:, :masters], mass[:masters, masters:] = follow, follow.T
-        diagonal: Any = range(masters, count)
-        mass[diagonal, diagonal] = 1.0
-        stiffness[diagonal, diagonal] = kept
-        return mass, stiffness
+    def boundary(self, static: Array, coupling: Array) -> tuple[Array, Array]:
+        """Mass and stiffness of the masters alone."""
+        mass = self.m_mm + self.m_sm.T @ static + static.T @ coupling
+        return _even(mass), _even(self.k_mm + self.k_sm.T @ static)
 
 
-def _estimate(squares: Array, masters: Array, residual: Array, cutoff: float) -> Array:
-    """Relative error of each frequency by the formula above, NaN beyond the first mode left out."""
-    energy = np.einsum("ij,ik,kj->j", masters, residual, masters)
-    result = np.full(len(squares), np.nan)
-    below = squares < cutoff
-    result[below] = squares[below] * np.maximum(energy[below], 0) / (1 - squares[below] / cutoff) / 2
-    return result
+def _even(matrix: Array) -> Array:
+    return np.asarray((matrix + matrix.T) / 2)
+
+
+def _blocks(m_bb: Array, k_bb: Array, follow: Array, squares: Array) -> tuple[Array, Array]:
+    """Reduced mass and stiffness; parts that are one or zero are so exactly (thesis 4.3.2, step 6)."""
+    masters, count = len(m_bb), len(m_bb) + len(squares)
+    mass, stiffness = np.zeros((count, count)), np.zeros((count, count))
+    mass[:masters, :masters], stiffness[:masters, :masters] = m_bb, k_bb
+    mass[masters:, :masters], mass[:masters, masters:] = follow, follow.T
+    diagonal: Any = range(masters, count)
+    mass[diagonal, diagonal] = 1.0
+    stiffness[diagonal, diagonal] = squares
+    return mass, stiffness
