@@ -214,6 +214,8 @@ def _found(found: Found) -> dict[str, Any]:
         "heldout_gain_ci95_db": [_rounded(value) for value in found.heldout_ci95_db],
         "probability": round(found.probability, 4),
         "signature": found.signature,
+        "domain": found.domain,
+        "instead_of": found.instead_of,
     }
 
 
