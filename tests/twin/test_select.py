@@ -12,11 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_rig import CAUSES, NAMES, effect, solve, toy_case
+from toy_rig import CAUSES, NAMES, TUNING, context_of, effect, solve, toy_case, yard_of
 
 from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.fit import fit_tuning
 from gearsim_twin.intervals import numbers_of
+from gearsim_twin.model import Model
 from gearsim_twin.rivals import alternatives, rejected
+from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
 
 
@@ -139,3 +142,40 @@ def test_no_more_causes_than_allowed():
     rng = np.random.default_rng(12)
     case = toy_case(12, [effect(rng, name, 2.0) for name in ("outer", "runout", "floor")])
     assert len(solve(case, Settings(most_causes=1)).choices) == 1
+
+
+def test_what_no_simulation_is_left_for_is_told():
+    """With a few simulations only the first guesses of the first causes are tried; the others are named."""
+    one = effect(np.random.default_rng(13), "outer", 1.5)
+    bench = toy_case(13, [one])
+    found = solve(bench, Settings(most_simulations=10), causes=(*CAUSES, *more_of("outer", 8)))
+    untried = found.rounds[0].untried
+    assert untried
+    reasons = {each.name: each.why for each in rejected(found, set())}
+    assert all("not tried" in reasons[name] for name in untried)
+    # What is begun is ended: the last eight guesses (of two records) and no fit.
+    assert bench.simulations <= 10 + 2 * 8 + 2
+
+
+def more_of(name, count):
+    """Causes of other names that show what one shows."""
+    copies = []
+    for k in range(count):
+        copies.append(Copy(CAUSES[NAMES.index(name)]))
+        copies[-1].name = f"copy {k}"
+    return copies
+
+
+def test_no_further_cause_is_looked_for_where_nothing_is_left():
+    one = effect(np.random.default_rng(14), "outer", 1.4)
+    bench = toy_case(14, [one])
+    yard = yard_of(bench)
+    tuned = fit_tuning(bench, yard, Model(TUNING, TUNING.nominal))
+    asked = []
+
+    def content(context):
+        asked.append(context)
+        return True
+
+    found = select(bench, yard, tuned, CAUSES, context_of(bench), Settings(), content=content)
+    assert (names(found), len(found.rounds), len(asked)) == (["outer"], 1, 1)

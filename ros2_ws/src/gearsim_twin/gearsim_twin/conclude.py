@@ -13,6 +13,7 @@ from gearsim_twin.choices import Candidate, Choice
 from gearsim_twin.compare.discrepancy import Comparison, compare, pooled
 from gearsim_twin.compare.merged import Discrepancy, discrepancies
 from gearsim_twin.intervals import numbers_of
+from gearsim_twin.labels import Label
 from gearsim_twin.rivals import alternatives, rejected
 from gearsim_twin.score import Scores
 from gearsim_twin.select import Selection
@@ -39,6 +40,8 @@ class Evidence:
     prior : Prior
     scores : Scores
     remarks : tuple of str
+    label : Label or None
+        What the records say against their labels.
     """
 
     bench: Workbench
@@ -48,6 +51,7 @@ class Evidence:
     prior: Prior
     scores: Scores
     remarks: tuple[str, ...]
+    label: Label | None = None
 
     def comparisons(self, trial: Trial) -> list[Comparison]:
         """Training records beside a model."""
@@ -61,16 +65,17 @@ def concluded(evidence: Evidence) -> Verdict:
     before = discrepancies(evidence.comparisons(evidence.tuned))
     after = material(discrepancies(evidence.comparisons(evidence.final)))
     found = [_found(choice, k, selection) for k, choice in enumerate(selection.choices)]
-    word = _word(bool(found), after)
+    label = evidence.label
+    word = _word(bool(found or label), after)
     others = [each for choice in selection.choices for each in alternatives(choice, selection)]
     unknown = [_unknown(after, selection)] if word in ("unknown", "partly_explained") else []
     return Verdict(
         word=word,
         scores=scores,
-        discrepancies=_attributed(evidence, before),
+        discrepancies=(*(() if label is None else (label.discrepancy,)), *_attributed(evidence, before)),
         remaining=after,
-        causes=(*found, *others, *unknown),
-        rejected=rejected(selection, {each.name for each in others}),
+        causes=(*(() if label is None else (label.found,)), *found, *others, *unknown),
+        rejected=rejected(selection, {each.name for each in (*others, *([label.found] if label else []))}),
         tuning=selection.tuned.trial.model.tuning.factors(selection.final.trial.model.knobs),
         extended_model=None,
         selection=selection,

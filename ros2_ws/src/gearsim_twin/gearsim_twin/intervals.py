@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from gearsim_twin.causes.cause import Parameter, Values
@@ -12,6 +14,9 @@ from gearsim_twin.verdict import Number
 __all__ = ["numbers_of"]
 
 _Z95 = 1.959964
+# A size fitted by a model whose own numbers are some per cent off is known no better than this part of it:
+# in hidden spalls on two rigs the sizes were off by 0.3 to 1 % where chance alone allowed a third of that.
+_LEAST_PART = 0.012
 
 
 def numbers_of(fitted: Fitted, number: int) -> tuple[Number, ...]:
@@ -38,7 +43,10 @@ def numbers_of(fitted: Fitted, number: int) -> tuple[Number, ...]:
 
 def _fitted(parameter: Parameter, coordinate: float, std: float) -> Number:
     low, middle, high = (parameter.prior.value(coordinate + side * _Z95 * std) for side in (-1.0, 0.0, 1.0))
-    return Number(parameter.name, parameter.unit, middle, (low, high))
+    widest = _Z95 * _LEAST_PART * abs(middle)
+    low, high = middle - math.hypot(middle - low, widest), middle + math.hypot(high - middle, widest)
+    prior = parameter.prior
+    return Number(parameter.name, parameter.unit, middle, (max(low, prior.low), min(high, prior.high)))
 
 
 def _read(parameter: Parameter, values: Values) -> Number:

@@ -17,6 +17,7 @@ from gearsim_twin.baseline import scenario_content
 from gearsim_twin.calibrate import Prior, calibrated, plain_prior
 from gearsim_twin.case import LEAST_PERIODS, Case, least_seconds
 from gearsim_twin.causes import CAUSES
+from gearsim_twin.causes.bearing_signs import signs_of
 from gearsim_twin.causes.cause import Cause, Content
 from gearsim_twin.causes.context import Context
 from gearsim_twin.channels import telling_channels
@@ -27,6 +28,7 @@ from gearsim_twin.conclude import Evidence, concluded
 from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
 from gearsim_twin.fit import fit_tuning
+from gearsim_twin.labels import speed_label
 from gearsim_twin.measuring_chain import measuring_chain
 from gearsim_twin.model import Model
 from gearsim_twin.realisations import Realisations, realisations_of
@@ -43,6 +45,8 @@ from gearsim_twin.workbench import Job, Trial, Workbench
 __all__ = ["Bench", "judge"]
 
 Tell = Callable[[str], None]
+# Records whose speed, load and force differ by less tell a search the same.
+_ANOTHER = 0.1
 # Periods of the slowest part that a simulation holds at least.
 _LEAST_PERIODS = 8.0
 
@@ -75,7 +79,12 @@ class Bench:
         training = range(len(case.training))
         simulated = [_simulated(simulator, k, nominal[k], settings) for k in training]
         both = [*(views[k] for k in training), *simulated]
-        plan = search = make_plan(case, both)
+        shifted = [
+            (sign.fault, sign.expected_order, sign.found_order / sign.expected_order - 1.0)
+            for k in training
+            for sign in signs_of(views[k])
+        ]
+        plan = search = make_plan(case, both, shifted)
         if len(plan.frame.channels) > settings.most_channels:
             pairs = [
                 (features(views[k], plan), features(made, plan))
@@ -83,7 +92,7 @@ class Bench:
             ]
             limits = measuring_chain(plan, case.levels_known).limits
             chosen = telling_channels(pairs, plan.frame.channels, settings.most_channels, limits)
-            search = make_plan(case, [view.only(chosen) for view in both])
+            search = make_plan(case, [view.only(chosen) for view in both], shifted)
         return cls(case, simulator, views, nominal, plan, search, settings)
 
     @property
@@ -126,8 +135,11 @@ class Bench:
         training = range(len(self.case.training))
         kept = [0]
         while len(kept) < min(self.settings.most_records, len(training)):
-            left = [k for k in training if k not in kept]
-            kept.append(max(left, key=lambda k: min(self._apart(k, other) for other in kept)))
+            apart = {k: min(self._apart(k, other) for other in kept) for k in training if k not in kept}
+            furthest = max(apart, key=lambda k: apart[k])
+            if apart[furthest] < _ANOTHER:
+                break
+            kept.append(furthest)
         return tuple(sorted(kept))
 
     def _apart(self, one: int, other: int) -> float:
@@ -205,8 +217,12 @@ def _judged(
     yard = prior.yard(work)
     tell("tuning the model")
     tuned = fit_tuning(work, yard, Model(prior.tuning, prior.tuning.nominal))
+    label = speed_label(
+        bench.views[:train], bench.views[train : train + held], causes, bench.plan.frame.window_turns
+    )
+    others = tuple(cause for cause in causes if label is None or cause.name != label.found.name)
     context_of = partial(bench.context, work, prior)
-    selection = select(work, yard, tuned, causes, context_of, settings, tell, _nothing_left)
+    selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left)
     tell("scoring on held-out records")
     whole = work if bench.search is bench.plan and len(told) == train else None
     whole = whole or bench.workbench(range(train + held), train, bench.plan)
@@ -220,7 +236,7 @@ def _judged(
         settings.seed,
     )
     remarks = dict.fromkeys([*case.remarks, *(each for view in bench.views for each in view.remarks)])
-    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks))
+    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label)
     verdict = concluded(evidence)
     if show:
         tell("gathering what is shown")

@@ -104,7 +104,9 @@ class Features:
         return Features(kept, levels, self.speed_hz)
 
 
-def make_plan(case: HasMachine, views: Sequence[View]) -> Plan:
+def make_plan(
+    case: HasMachine, views: Sequence[View], shifted: Sequence[tuple[str, float, float]] = ()
+) -> Plan:
     """What is compared, from the nameplate and the records at hand.
 
     Parameters
@@ -113,13 +115,15 @@ def make_plan(case: HasMachine, views: Sequence[View]) -> Plan:
     views : sequence of View
         The measured records for training; simulated ones too, if lines of theirs that no record has shall
         be among the places.
+    shifted : sequence of (fault, order, share)
+        Bearing families whose lines lie off the nameplate's orders, as `make_frame` takes them.
 
     Raises
     ------
     InputError
         When records have no channel in common or are too short.
     """
-    frame = make_frame(case.machine, views)
+    frame = make_frame(case.machine, views, shifted)
     places: list[Place] = []
     materials = [Material(view, frame) for view in views]
     for domain, representation in REPRESENTATIONS.items():

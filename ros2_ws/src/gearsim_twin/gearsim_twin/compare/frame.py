@@ -32,6 +32,7 @@ _LEAST_SECONDS = 0.25
 # Carrier bands: above the fault lines themselves (they would beat), each wide enough for four harmonics.
 _CLEAR_OF, _LOW_SHARE, _HARMONIC_WIDTHS = 6.0, 0.01, 8.8
 _SAME_ORDER = 1e-3
+_BEYOND = 1.25  # of how far a record has a family off its place
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +103,17 @@ class Frame:
         return max(2, math.ceil(self.smear * order * self.window_turns))
 
 
-def make_frame(machine: Machine, views: Sequence[View]) -> Frame:
+def make_frame(
+    machine: Machine, views: Sequence[View], shifted: Sequence[tuple[str, float, float]] = ()
+) -> Frame:
     """The settings for a case.
+
+    Parameters
+    ----------
+    machine : Machine
+    views : sequence of View
+    shifted : sequence of (fault, order, share)
+        Families of a nameplate's order that lie off it by a share of it: they are looked for so far.
 
     Raises
     ------
@@ -117,7 +127,7 @@ def make_frame(machine: Machine, views: Sequence[View]) -> Frame:
     window_turns = _window_turns(machine, turns)
     window_s = min(seconds / _TIME_WINDOWS, _LONGEST_S)
     top_hz = TOP_SHARE * rate_hz
-    families = _families(machine) if math.isfinite(window_turns) else ()
+    families = _families(machine, shifted) if math.isfinite(window_turns) else ()
     loose = [view.speed.relative_error for view in views if view.phase is None]
     return Frame(
         machine,
@@ -154,7 +164,7 @@ def _window_turns(machine: Machine, turns: float) -> float:
     return min(max(apart, turns / _MOST_WINDOWS), turns / _FEWEST_WINDOWS)
 
 
-def _families(machine: Machine) -> tuple[Family, ...]:
+def _families(machine: Machine, shifted: Sequence[tuple[str, float, float]]) -> tuple[Family, ...]:
     groups: list[tuple[list[str], Family]] = []
     for family in fault_families(machine):
         for names, first in groups:
@@ -165,9 +175,19 @@ def _families(machine: Machine) -> tuple[Family, ...]:
             new = Family(family.label, family.fault, family.order, family.sideband_order, family.tolerance)
             groups.append(([family.component], new))
     return tuple(
-        Family(f"{f.label} of {_listed(names)}", f.fault, f.order, f.sideband_order, f.tolerance)
+        Family(f"{f.label} of {_listed(names)}", f.fault, f.order, f.sideband_order, _reach(f, shifted))
         for names, f in groups
     )
+
+
+def _reach(family: Family, shifted: Sequence[tuple[str, float, float]]) -> float:
+    """How far a family is looked for: as the nameplate has it, or beyond where a record has it."""
+    own = [
+        _BEYOND * abs(share)
+        for fault, order, share in shifted
+        if fault == family.fault and abs(order / family.order - 1) < _SAME_ORDER
+    ]
+    return max([family.tolerance, *own])
 
 
 def _listed(names: list[str]) -> str:
