@@ -25,7 +25,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-class SpeedInHz(click.ParamType):
+class SpeedInHz(click.types.FloatParamType):
     """A speed in Hz, or with its unit: `29.9`, `29.9Hz`, `1796rpm`."""
 
     name = "speed"

@@ -20,6 +20,7 @@ from gearsim_sim.engine import MAX_RATE_HZ
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.history import History
 from gearsim_sim.models import MODELS, RunningModel
+from gearsim_sim.rehearsal import rehearse
 from gearsim_sim.scenario import Scenario
 from gearsim_sim.sensors.rig import Batch, RigSensors
 from gearsim_sim.sensors.rows import Encoder, Tacho
@@ -51,6 +52,8 @@ class Simulation:
         self.scenario = scenario
         self.t0_ns = t0_ns
         self._factor = scenario.sensors.sampling.oversampling
+        if model is None:
+            _told(scenario, lambda: rehearse(scenario))
         self._model = model or _told(scenario, lambda: _model(scenario))
         self._history = History(scenario, None if self._model.steady else self._model.operating_point_at)
         for event in scenario.events:

@@ -54,6 +54,9 @@ def command(
     loaded = load_scenario(scenario)
     from gearsim_bringup.live import LiveRun, simulator  # after what can be refused at once
     from gearsim_bringup.reach import reach_lines
+    from gearsim_sim.rehearsal import rehearse
+
+    rehearse(loaded)
 
     voice = Voice(json_mode=False)
     teller = Teller(voice, loaded.sample_rate_hz)

@@ -44,7 +44,9 @@ def command(
     refuse_existing(out, "the name of a new folder")
     loaded = load_scenario(scenario)
     from gearsim_bringup.offline import simulate_to  # after what can be refused at once
+    from gearsim_sim.rehearsal import rehearse
 
+    rehearse(loaded)
     if seed is not None:
         loaded = dataclasses.replace(loaded, seed=seed)
     tell_first_use(voice)

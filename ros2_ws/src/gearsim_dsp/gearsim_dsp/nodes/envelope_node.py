@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gearsim_dsp.nodes.base import MonitorNode
 from gearsim_dsp.nodes.parameters import BandParameters
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
+from gearsim_dsp.streams.fitting import for_bearings
 from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_io.nameplate import Machine
 from gearsim_io.nodes.parameters import parameter
@@ -40,8 +41,10 @@ class EnvelopeParameters(BandParameters):
 
 
 def make_monitor(machine: Machine, parameters: EnvelopeParameters) -> AlarmedMonitor:
-    """The monitor of a machine with its alarms."""
-    monitor = EnvelopeMonitor(machine, parameters.envelope_settings(), SOURCE)
+    """The monitor of a machine with its alarms; windows are longer where the machine turns slowly."""
+    settings = parameters.envelope_settings()
+    settings = replace(settings, window=for_bearings(settings.window, machine))
+    monitor = EnvelopeMonitor(machine, settings, SOURCE)
     return AlarmedMonitor(monitor, parameters.alarm_settings())
 
 

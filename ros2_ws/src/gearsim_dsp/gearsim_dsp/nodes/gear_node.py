@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gearsim_dsp.nodes.learning import LearningNode, LearningParameters
 from gearsim_dsp.nodes.parameters import MonitorParameters
+from gearsim_dsp.streams.fitting import for_gears
 from gearsim_dsp.streams.gear_monitor import GearMonitor, GearSettings
 from gearsim_dsp.streams.report import AlarmedMonitor
 from gearsim_io.nameplate import Machine
@@ -40,7 +41,9 @@ class GearParameters(LearningParameters, MonitorParameters):
 
 def make_monitor(machine: Machine, parameters: GearParameters) -> AlarmedMonitor:
     """The monitor of a machine with its alarms, and with the baseline that is stored of it."""
-    monitor = GearMonitor(machine, parameters.gear_settings(), SOURCE)
+    settings = parameters.gear_settings()
+    settings = replace(settings, window=for_gears(settings.window, machine))
+    monitor = GearMonitor(machine, settings, SOURCE)
     parameters.recall(monitor.keeper, SOURCE)
     return AlarmedMonitor(monitor, parameters.alarm_settings())
 

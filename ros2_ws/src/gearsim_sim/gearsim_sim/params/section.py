@@ -14,6 +14,9 @@ from gearsim_sim.params.as_built import PREFIX, as_built
 from gearsim_sim.params.assumed_bearings import with_assumed_bearings
 from gearsim_sim.params.overrides import override
 
+_MODEL = {"parallel_shaft": "lpm34", "planetary": "planetary18", "bearing_rig": "bearing5"}
+"""The usual model of each kind of machine."""
+
 
 @dataclass(frozen=True)
 class ModelSection:
@@ -57,7 +60,10 @@ def read_model_section(
     section = content.get("model")
     if not isinstance(section, dict) or section.get("kind") != kind:
         found = section.get("kind") if isinstance(section, dict) else section
-        raise InputError(where, "kind", found, f"{kind}, as machine {example} has it")
+        expected = f"{kind}, as machine {example} has it"
+        if found in _MODEL:
+            expected += f"; a scenario of this machine needs model: {_MODEL[found]}"
+        raise InputError(where, "kind", found, expected)
     plate, section = with_assumed_bearings(plate, section, where)
     if overrides:
         built = {name: value for name, value in overrides.items() if name.startswith(PREFIX)}
