@@ -39,9 +39,11 @@ def draw_mesh(mesh: Mesh, path: Path) -> None:
     colours = np.array([to_rgb(_colour(mesh, region)) for region in regions.tolist()])
     for axes, view in zip(figure.subplots(1, 2), _VIEWS, strict=True):
         _paint(axes, view, mesh.nodes_m, faces, colours, line_width=0.2)
-        for name, node in mesh.masters.items():
-            across, up = view.project(mesh.nodes_m[node][None])[0, :2]
-            axes.text(across, up, name, fontsize=11, ha="center", va="center", weight="bold")
+        places = view.project(mesh.nodes_m[list(mesh.masters.values())])
+        # Those of the wall in front alone: names of the others would stand on the wrong wall.
+        for name, (across, up, near) in zip(mesh.masters, places.tolist(), strict=True):
+            if near > places[:, 2].mean():
+                axes.text(across, up, name, fontsize=11, ha="center", va="center", weight="bold")
     used = {_colour(mesh, region) for region in np.unique(regions).tolist()}
     groups = (*_GROUPS, ("rings with eccentric discs", _RING))
     legend = [Patch(color=colour, label=name) for name, colour in groups if colour in used]

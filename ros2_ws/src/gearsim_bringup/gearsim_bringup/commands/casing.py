@@ -66,7 +66,10 @@ def build(casing: str, free: bool, out: Path | None, deck: Path | None, json_mod
     for file in files:
         voice.say(f"  {file}")
     counts = {"shells": len(mesh.quads), "solids": len(mesh.hexes), "nodes": len(mesh.nodes_m)}
-    voice.result({"name": params.name, **counts, "displacements": structure.size, "files": map(str, files)})
+    told = [str(file) for file in files]
+    voice.result(
+        {"name": params.name, **counts, "displacements": structure.size, "files": [*map(str, files)]}
+    )
 
 
 @command.command("check", epilog=example("./gearsim casing check --finer"))

@@ -1,0 +1,101 @@
+"""`gearsim casing`: what a user meets, on a coarse casing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gearsim_bringup.cli import BAD_INPUT, main
+from gearsim_sim.model.casing.params import FOLDER
+from gearsim_sim.model.casing.reduced import find_reduced, load_reduced
+
+
+@pytest.fixture
+def coarse(tmp_path: Path) -> str:
+    """The shipped casing under another name, with large elements."""
+    text = (FOLDER / "unsw_casing.yaml").read_text()
+    for old, new in (
+        ("name: unsw_casing", "name: coarse"),
+        ("plate_size: {value: 7,", "plate_size: {value: 25,"),
+        ("ring_size: {value: 7,", "ring_size: {value: 20,"),
+        ("ring_layers: {value: 4,", "ring_layers: {value: 1,"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "coarse.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_build_writes_what_reduce_reads(coarse, tmp_path, capsys):
+    out = tmp_path / "built"
+    deck_file = tmp_path / "c.bdf"
+    assert main(["casing", "build", coarse, "--out", str(out), "--deck", str(deck_file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["displacements"] > 1000
+    names = {Path(file).name for file in told["files"]}
+    assert names == {"stiffness.npz", "mass.npz", "casing.yaml", "c.bdf"}
+    deck = deck_file.read_text()
+    assert deck.count("CQUAD4*") == told["shells"]
+    assert deck.count("CHEXA*") == told["solids"]
+    assert deck.count("GRID*") == told["nodes"]
+    for arguments in ([coarse], [str(out / "casing.yaml")]):
+        file = tmp_path / "reduced.npz"
+        assert main(["casing", "reduce", *arguments, "--modes", "20", "--out", str(file), "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert (told["size"], told["modes"], told["masters"]) == (44, 20, ["b1", "b2", "b3", "b4"])
+        assert 0 < told["valid_hz"] <= told["cutoff_hz"]
+        assert load_reduced(file).size == 44
+
+
+def test_sensors_anywhere_come_into_the_file(coarse, tmp_path, capsys):
+    file = tmp_path / "reduced.npz"
+    sensor = ["--sensor", "lid:0,0.19,0.06:y"]
+    assert main(["casing", "reduce", coarse, "--modes", "10", *sensor, "--out", str(file)]) == 0
+    assert "lid" in capsys.readouterr().out
+    site = load_reduced(file).site("lid")
+    assert site.direction == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["reduce", "no_casing", "--out", "x.npz"], "one of unsw_casing"),
+        (["reduce", "--out", "x.txt"], "ends in .npz"),
+        (["reduce", "--out", "none/x.npz"], "folder that exists"),
+        (["reduce", "--out", "x.npz", "--sensor", "far:9,9,9:y"], "sensor far"),
+        (["reduce", "--out", "x.npz", "--sensor", "far"], "NAME:X,Y,Z:DIRECTION"),
+        (["reduce", "--out", "x.npz", "--modes", "-1"], "--modes"),
+        (["reduce", "--out", "x.npz", "--modes", "8", "--band", "4000"], "valid up to"),
+        (["check", "none.yaml"], "no such file"),
+        (["show", "--out", "pictures", "--modes", "0"], "--modes"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, told, coarse, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if "reduce" in arguments and "no_casing" not in arguments:
+        arguments = ["reduce", coarse, *arguments[1:]]
+    assert main(["casing", *arguments]) == BAD_INPUT
+    said = capsys.readouterr().err.strip()
+    assert told in said
+    assert "\n" not in said
+    assert [path.name for path in tmp_path.iterdir()] == ["coarse.yaml"]
+
+
+def test_pictures_are_drawn(coarse, tmp_path, capsys):
+    assert main(["casing", "show", coarse, "--modes", "5", "--out", str(tmp_path / "p"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["frequencies_hz"]) == 5
+    assert told["frequencies_hz"][0] > 100  # rigid-body modes are left out
+    for file in told["files"]:
+        assert Path(file).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_shipped_casing_is_that_of_the_thesis():
+    casing = find_reduced("unsw_casing")
+    assert casing.size == 124
+    assert casing.masters == ("b1", "b2", "b3", "b4")
+    assert casing.valid_hz > 3000
+    assert casing.site("b3_top_y").direction == (0.0, 1.0, 0.0)
