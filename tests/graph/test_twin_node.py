@@ -16,7 +16,12 @@ from live_rig import machine, stream
 pytestmark = pytest.mark.graph
 
 TWIN = "gearsim_twin.nodes.twin"
+_COMPILED_S = 240.0  # the integrator, on a busy computer where it never was
 SETTINGS = {"window_s": 1.0, "hop_s": 0.5, "learn_s": 12.0}
+
+
+def connected(rig):
+    rig.until(lambda: all(out.get_subscription_count() for out in rig.out.values()), _COMPILED_S)
 
 
 @pytest.fixture
@@ -28,7 +33,7 @@ def test_it_learns_the_standing_discrepancy_and_tells_a_new_one(rig, tmp_path):
     node = rig.domain.start_node(TWIN, {**SETTINGS, "model": "bearing2", "baseline_dir": str(tmp_path)})
     diagnostics = rig.hear(qos.DIAGNOSTICS)
     features, alarms = rig.hear(qos.FEATURES), rig.hear(qos.ALARM)
-    rig.connected()
+    connected(rig)
     rig.nameplate(machine())
     rig.until(lambda: rig.status("twin: machine")[1] == "mfpt")
     rig.play(stream(24.0, 5, fault_at_s=20.0).batches(4096), times_real=3.0)
@@ -36,7 +41,7 @@ def test_it_learns_the_standing_discrepancy_and_tells_a_new_one(rig, tmp_path):
     rig.until(stored.exists)
     rig.until(lambda: any("BPFO of test_bearing" in alarm.reason for alarm in alarms))
     assert {alarm.source for alarm in alarms} == {"twin"}
-    assert min(alarm.stamp.sec + 1e-9 * alarm.stamp.nanosec for alarm in alarms) > 20.0
+    assert min(alarm.header.stamp.sec + 1e-9 * alarm.header.stamp.nanosec for alarm in alarms) > 20.0
     assert {each.source for each in features} == {"twin"}
     names = {value.name for each in features for value in each.values}
     assert {"psd_residual_rms", "envelope_residual_rms", "envelope_residual"} <= names
@@ -53,12 +58,11 @@ def test_bad_models_are_told_in_one_line(rig):
         ({"model": "nonsense"}, "got nonsense"),
     ):
         node = rig.domain.start_node(TWIN, values)
-        assert node.wait(120.0), node.output
-        assert node.returncode() == 2, node.output
+        assert node.wait(_COMPILED_S) == 2, node.output
         assert words in node.output.strip().splitlines()[-1]
     node = rig.domain.start_node(TWIN, {"model": "lpm34"})
     rig.hear(qos.DIAGNOSTICS)
-    rig.connected()
+    connected(rig)
     rig.nameplate(machine())
     rig.until(lambda: "nameplate refused" in rig.status("twin: machine")[1])
     assert "a model that describes mfpt" in rig.status("twin: machine")[1]

@@ -18,7 +18,8 @@ from gearsim_io.errors import InputError
 
 __all__ = ["MONITORS", "BadNodeError", "Choice", "LiveRun", "Outcome", "player", "simulator"]
 
-_READY_S = 60.0
+# A twin that was never run compiles first, which takes up to a minute.
+_READY_S = 150.0
 # In which another rig in this domain makes itself known, as a rule. At times the middleware's first greetings
 # are lost and the next come after 3 s: so the run keeps looking.
 _DISCOVERY_S = 1.0

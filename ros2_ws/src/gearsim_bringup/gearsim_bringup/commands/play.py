@@ -51,6 +51,7 @@ def command(
 def _judge(bag: Path, source: NodeSpec, choice: Choice) -> None:
     import tempfile
 
+    from gearsim_bringup.first_use import tell_first_use
     from gearsim_bringup.live import LiveRun
     from gearsim_bringup.tell import Teller
     from gearsim_bringup.ui import Voice
@@ -63,6 +64,8 @@ def _judge(bag: Path, source: NodeSpec, choice: Choice) -> None:
     if place is None:
         raise InputError(str(bag), qos.ACCEL.full_name, "nothing", "samples to diagnose")
     voice = Voice(json_mode=False)
+    if choice.model:
+        tell_first_use(voice)
     teller = Teller(voice, place.sample_rate_hz)
     with tempfile.TemporaryDirectory(prefix="gearsim_play_") as logs:
         run = LiveRun(source, Path(logs), on_alarm=teller.alarm, on_truth=teller.truth, choice=choice)

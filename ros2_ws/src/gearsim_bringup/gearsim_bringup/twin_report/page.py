@@ -62,6 +62,7 @@ def make_twin_page(verdict: Verdict) -> str:
     exhibit = sides.exhibit
     state, title, below = words.headline(verdict)
     differences, more = words.difference_rows(verdict)
+    tiles = tile_rows(exhibit)
     rest, more_rest = words.rest(verdict)
     domains, steps = words.step_rows(exhibit)
     plots = [shown(f"plot-{n}", name, partial(draw, sides)) for n, (name, draw) in enumerate(_OVERLAYS)]
@@ -81,7 +82,8 @@ def make_twin_page(verdict: Verdict) -> str:
         domains=domains,
         steps=steps,
         tuning=words.tuning_line(verdict),
-        tiles=tile_rows(exhibit),
+        tiles=tiles,
+        widest=max((len(row.channels) for row in tiles), default=0),
         last="extended" if len(exhibit.steps) > 2 else "tuned",
         legend=list(legend()),
         causes=[

@@ -115,7 +115,8 @@ def _tile(comparison: Comparison, sure: np.ndarray, rows: list[int], channel: st
     k = max(mine, key=lambda row: abs(float(comparison.z[row])))
     size, z = float(comparison.difference_db[k]), float(comparison.z[k])
     detail = f"{comparison.places[k].words(comparison.speed_hz)}: {size:+.1f} dB, z {z:+.1f}"
-    return Tile(f"{size:+.0f}".replace("-", "−"), _style(size, bool(sure[k])), bool(sure[k]), detail)
+    label = "0" if abs(size) < 0.5 else f"{size:+.0f}".replace("-", "−")
+    return Tile(label, _style(size, bool(sure[k])), bool(sure[k]), detail)
 
 
 def _style(size_db: float, sure: bool) -> str:
