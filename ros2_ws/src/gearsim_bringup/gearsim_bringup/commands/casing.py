@@ -67,9 +67,7 @@ def build(casing: str, free: bool, out: Path | None, deck: Path | None, json_mod
         voice.say(f"  {file}")
     counts = {"shells": len(mesh.quads), "solids": len(mesh.hexes), "nodes": len(mesh.nodes_m)}
     told = [str(file) for file in files]
-    voice.result(
-        {"name": params.name, **counts, "displacements": structure.size, "files": [*map(str, files)]}
-    )
+    voice.result({"name": params.name, **counts, "displacements": structure.size, "files": told})
 
 
 @command.command("check", epilog=example("./gearsim casing check --finer"))
