@@ -234,3 +234,13 @@ def test_windows_of_a_slow_machine_are_long_enough_and_what_stays_unjudged_is_na
         (detail,) = short
         assert "bearings cannot be judged by 6.0 turns" in detail
         assert "at least 8 are needed (4 s at 2 Hz)" in detail
+
+
+def test_a_nameplate_without_parts_is_told_once():
+    plate = replace(machine(), bearings=())
+    diagnosis = diagnose_record(_record(noise(np.random.default_rng(8), 48_000)), plate)
+    assert "nothing_to_look_for" in _kinds(diagnosis)
+    told = [line for line in diagnosis.lines() if "nameplate lists" in line]
+    assert told == [
+        "no fault found: nothing could be judged: the nameplate lists neither bearings nor pairs of gears"
+    ]

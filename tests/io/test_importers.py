@@ -332,6 +332,7 @@ TWO = {"rate": {"value": number(1000, "Hz")}, "channels": {"acc": {"column": "x"
         ("run.csv", "x,y\n", "no lines of numbers"),
         ("run.csv", "", "an empty file"),
         ("run.csv", b"\xff\xfe\x00\x01", "a readable .csv file"),
+        ("run.csv", b"\xff\xfe\x00\x01", "got bytes that are no text, from byte 0 on"),
         ("run.csv.gz", b"not gzip", "a readable .csv.gz file"),
         ("run.mat", b"not matlab at all, but long enough to look at" * 20, "a readable .mat file"),
         ("run.wav", b"RIFFxxxxWAVE", "a readable .wav file"),

@@ -25,7 +25,13 @@ from gearsim_dsp.judges.sizes import with_size
 from gearsim_dsp.judges.strange import find_strange_comb
 from gearsim_dsp.kinematics import mesh_orders
 from gearsim_dsp.quality import QualityIssue, check_levels
-from gearsim_dsp.remarks import LEAST_WINDOW_S, record_remarks, too_short, what_is_lacking
+from gearsim_dsp.remarks import (
+    LEAST_WINDOW_S,
+    record_remarks,
+    speed_remarks,
+    too_short,
+    what_is_lacking,
+)
 from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.streams.assembler import Window, WindowAssembler, WindowSettings
 from gearsim_dsp.streams.envelope_monitor import EnvelopeMonitor, EnvelopeSettings
@@ -38,9 +44,10 @@ from gearsim_io.importers import machine_for
 from gearsim_io.nameplate import Machine
 from gearsim_io.numbers import number, plural
 from gearsim_io.record import Record
-from gearsim_io.stated_speed import FROM_FILE, FROM_USER, given_far_off, origin_words
+from gearsim_io.stated_speed import FROM_FILE, FROM_USER
 
 _IMPACT_PROBABILITY = 1e-4
+_NOTHING = "nothing_to_look_for"
 _ORIGIN = {FROM_USER: "as given, not measured", FROM_FILE: "as stated in the file, not measured"}
 
 __all__ = ["LEAST_CONFIDENCE", "Diagnosis", "DiagnosisSettings", "diagnose_record"]
@@ -126,6 +133,7 @@ class Diagnosis:
         lines += [
             f"quality: {q.channel + ': ' if q.channel else ''}{q.issue.replace('_', ' ')}: {q.detail}"
             for q in self.quality
+            if not (q.issue == _NOTHING and self.lacking)  # the last line says it
         ]
         lines += [_finding_line(finding) for finding in self.findings]
         if not self.findings:
@@ -301,11 +309,10 @@ def _quality(
         least = too_short(machine, record.seconds)
         samples = f"{plural(record.sample_count, 'sample')}, {number(record.seconds, 2)} s"
         issues.append(QualityIssue("too_short", "", f"{samples}{least and f'; {least}'}", True))
-    issues += _about_speed(record, machine, speed)
+    issues += speed_remarks(record, machine, speed)
     issues += check_levels(record, machine)
     if not machine.bearings:
-        detail = "the nameplate lists no bearings: no fault family could be looked for"
-        issues.append(QualityIssue("nothing_to_look_for", "", detail))
+        issues.append(QualityIssue(_NOTHING, "", "the nameplate lists no bearings: none were judged"))
     return issues
 
 
@@ -335,28 +342,6 @@ def _merged(reports: list[Report]) -> list[QualityIssue]:
         )
         for (kind, channel), items in found.items()
     ]
-
-
-def _about_speed(record: Record, machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
-    issues = []
-    nominal, tolerance = machine.nominal_speed_hz, machine.speed_tolerance
-    said = origin_words(record.notes, nominal)
-    if not np.isfinite(speed.value_hz):
-        detail = "no tacho, no nominal speed, and no comb of shaft lines in the signal"
-        issues.append(QualityIssue("speed_unknown", "", detail))
-    elif speed.source == "nameplate":
-        reason = f" ({speed.note})" if speed.note else ""
-        detail = f"{said} +- {number(100 * tolerance, 2)} % is taken{reason}"
-        issues.append(QualityIssue("speed_not_measured", "", detail))
-    elif np.isfinite(nominal) and abs(speed.value_hz / nominal - 1) > tolerance:
-        percent = number(100 * (speed.value_hz / nominal - 1), 2, sign=True)
-        detail = f"{number(speed.value_hz, 4)} Hz is {percent} % off {said}"
-        issues.append(QualityIssue("speed_off_nameplate", "", detail))
-    if far := given_far_off(record.notes, tolerance):
-        issues.append(QualityIssue("speed_off_nameplate", "", far))
-    if speed.source in ("tacho", "encoder") and speed.note:
-        issues.append(QualityIssue(f"{speed.source}_mended", "", speed.note))
-    return issues
 
 
 def _electrical(

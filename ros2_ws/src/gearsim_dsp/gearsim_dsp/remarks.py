@@ -9,12 +9,14 @@ from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.shaft import undecided_orders
 from gearsim_dsp.judges.unlisted import unlisted_mesh
 from gearsim_dsp.quality import QualityIssue
+from gearsim_dsp.speed import ShaftSpeed
 from gearsim_dsp.stated_rate import doubt_of_rate
 from gearsim_io.nameplate import Machine
 from gearsim_io.numbers import number
 from gearsim_io.record import Record
+from gearsim_io.stated_speed import given_far_off, origin_words
 
-__all__ = ["LEAST_WINDOW_S", "record_remarks", "too_short", "what_is_lacking"]
+__all__ = ["LEAST_WINDOW_S", "record_remarks", "speed_remarks", "too_short", "what_is_lacking"]
 
 LEAST_WINDOW_S = 0.05
 """Shortest window that is looked at."""
@@ -34,6 +36,29 @@ def record_remarks(record: Record, measured: Measured) -> list[QualityIssue]:
     remarks += [rate] if rate else []
     mesh = None if _has_parts(measured.machine) else unlisted_mesh(measured)
     return remarks + ([mesh] if mesh else [])
+
+
+def speed_remarks(record: Record, machine: Machine, speed: ShaftSpeed) -> list[QualityIssue]:
+    """What is to be said of the speed: not known, not measured, off the nameplate, an angle signal mended."""
+    issues = []
+    nominal, tolerance = machine.nominal_speed_hz, machine.speed_tolerance
+    said = origin_words(record.notes, nominal)
+    if not math.isfinite(speed.value_hz):
+        detail = "no tacho, no nominal speed, and no comb of shaft lines in the signal"
+        issues.append(QualityIssue("speed_unknown", "", detail))
+    elif speed.source == "nameplate":
+        reason = f" ({speed.note})" if speed.note else ""
+        detail = f"{said} +- {number(100 * tolerance, 2)} % is taken{reason}"
+        issues.append(QualityIssue("speed_not_measured", "", detail))
+    elif math.isfinite(nominal) and abs(speed.value_hz / nominal - 1) > tolerance:
+        percent = number(100 * (speed.value_hz / nominal - 1), 2, sign=True)
+        detail = f"{number(speed.value_hz, 4)} Hz is {percent} % off {said}"
+        issues.append(QualityIssue("speed_off_nameplate", "", detail))
+    if far := given_far_off(record.notes, tolerance):
+        issues.append(QualityIssue("speed_off_nameplate", "", far))
+    if speed.source in ("tacho", "encoder") and speed.note:
+        issues.append(QualityIssue(f"{speed.source}_mended", "", speed.note))
+    return issues
 
 
 def what_is_lacking(machine: Machine, measured: Measured, seconds: float) -> str:

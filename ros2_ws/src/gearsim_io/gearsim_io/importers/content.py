@@ -138,8 +138,17 @@ def read_content(path: Path) -> Content:
         raise EnvironmentLackError(f"{library} is not installed", f"pip install {library}") from None
     except Exception as error:  # what the libraries raise on damaged files is not listed anywhere
         kind = suffix_of(path).lstrip(".")
-        reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise InputError(where, "", reason, f"a readable .{kind} file") from None
+        raise InputError(where, "", _damage(error), f"a readable .{kind} file") from None
+
+
+def _damage(error: Exception) -> str:
+    """What a reading library found, in words where it is usual."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"bytes that are no text, from byte {error.start} on"
+    told = f": {error}" if str(error) else ""
+    if isinstance(error, (OSError, EOFError)):
+        return f"a file that is damaged or cut off{told or f' ({type(error).__name__})'}"
+    return f"{type(error).__name__}{told}"
 
 
 def _fits(name: str, pattern: str) -> bool:
