@@ -245,10 +245,7 @@ def _by_windows(
     batch_samples: int,
     impulses: bool = True,
 ) -> tuple[EvidencePool, list[Report], list[Report]]:
-    """Evidence of all windows together, and the reports of the envelope monitor on each.
-
-    With `impulses` also those of the kurtosis monitor, which needs no speed.
-    """
+    """All windows' evidence, the envelope monitor's reports and, if asked, the kurtosis monitor's (no speed)."""
     settings = EnvelopeSettings(window, size_every=0, between=True)
     envelope = EnvelopeMonitor(plate, settings, speeds=speeds, by_window=False)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
