@@ -245,7 +245,7 @@ def _by_windows(
     batch_samples: int,
     impulses: bool = True,
 ) -> tuple[EvidencePool, list[Report], list[Report]]:
-    """All windows' evidence, the envelope monitor's reports and, if asked, the kurtosis monitor's (no speed)."""
+    """All windows' evidence, the envelope monitor's reports and, if asked, those of the kurtosis monitor."""
     settings = EnvelopeSettings(window, size_every=0, between=True)
     envelope = EnvelopeMonitor(plate, settings, speeds=speeds, by_window=False)
     kurtosis = KurtosisMonitor(plate, KurtosisSettings(window))
