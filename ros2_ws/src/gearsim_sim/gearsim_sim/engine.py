@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
+from gearsim_sim.carrying import needed_sites
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.integrate.decimate import HALF_LENGTH_SAMPLES, decimate, padded_taps
 from gearsim_sim.model.assembly import Vector
@@ -59,6 +60,7 @@ class EngineOutput:
         default_factory=dict
     )  # name -> (n,) of `Plant.signals`
     probes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)  # name -> (n,)
+    forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)  # on a casing, filtered
 
     @property
     def sample_count(self) -> int:
@@ -92,8 +94,12 @@ class Engine:
     probes : sequence of str
         Further outputs out of `probe_names`: displacement of a bearing or of a mesh (without
         transmission error), contact force of the shaft on the pedestal, force of the mesh.
+    forces : bool
+        Whether the bearings' forces on a flexible casing are put out, those of dampers included.
     operation : Operation, optional
         Operating profile, ripple and added structure; without it speed and load change by events only.
+    looked_at : sequence of str
+        Sites that matter; in a flexible casing, where each takes time, no others are put out.
 
     Raises
     ------
@@ -113,7 +119,9 @@ class Engine:
         load_nm: float | None = None,
         sites: Sites | None = None,
         probes: Sequence[str] = (),
+        forces: bool = False,
         operation: Operation | None = None,
+        looked_at: Sequence[str] = (),
     ) -> None:
         check_numbers(seed, sample_rate_hz, oversampling)
         self.params = params
@@ -128,12 +136,14 @@ class Engine:
         if speed_hz is not None:
             speed_hz = self._timeline.checked_speed(speed_hz)
         load_nm = self._timeline.checked_load(limits.load_nm if load_nm is None else load_nm)
-        self._sites = checked_sites(self.plant.sites if sites is None else sites, self.plant.system.dof_names)
+        wanted = needed_sites(self.plant, looked_at) if sites is None else sites
+        self._sites = checked_sites(wanted, self.plant.system.dof_names)
         self._probes = tuple(probes)
         self._probe_names = probe_names(self.plant)
         for name in self._probes:
             if name not in self._probe_names:
                 raise InputError("engine", "probes", name, "one of " + ", ".join(self._probe_names))
+        self._forces = forces
         self._prepare(seed, speed_hz, load_nm, faults)
         self._settle()
         self.warm_up()
@@ -147,7 +157,9 @@ class Engine:
         forces = self._operation.forces(self.plant)
         self._schedule = first_schedule(self.plant, self._timeline, self._steps, course, faults, forces)
         probed = bool(self._probes)
-        self._stepper = Stepper(self.plant, self._schedule, self._sites, self._steps, probed=probed)
+        self._stepper = Stepper(
+            self.plant, self._schedule, self._sites, self._steps, probed=probed, forces=self._forces
+        )
         self._taps = padded_taps(self._steps)
         columns = (2 * HALF_LENGTH_SAMPLES + _BLOCK_SAMPLES) * self._steps + self._taps.size
         self._accel = np.zeros((self._stepper.row_count, columns))
@@ -243,11 +255,12 @@ class Engine:
             done += count
         if not np.all(np.isfinite(accel)):
             raise FloatingPointError(f"the motion became infinite before sample {self._next + n}")
+        pushes = accel[self._stepper.row_count - len(self._stepper.force_names) :]
         if self._stepper.row_count != len(self._sites):
             accel = accel[self._stepper.site_rows]
-        return self._output(accel, self._take_motions(n))
+        return self._output(accel, pushes, self._take_motions(n))
 
-    def _output(self, accel: NDArray[np.float64], motion: Motion) -> EngineOutput:
+    def _output(self, accel: NDArray[np.float64], pushes: Any, motion: Motion) -> EngineOutput:
         first = self._next
         self._next += accel.shape[1]
         values = {
@@ -265,6 +278,7 @@ class Engine:
             speed_hz=motion.speed_hz,
             signals=dict(zip(self.plant.signals, motion.signals, strict=True)),
             probes=values,
+            forces=dict(zip(self._stepper.force_names, pushes, strict=True)),
         )
 
     def _integrate(self, to_step: int) -> None:

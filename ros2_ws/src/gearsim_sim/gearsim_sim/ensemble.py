@@ -121,6 +121,9 @@ class Ensemble:
 
     def _lane(self, number: int, variant: Variant) -> Lane:
         plant = make_plant(variant.params, variant.seed)
+        if plant.carrier is not None:
+            expected = "a machine without a flexible casing: those run one by one"
+            raise InputError("ensemble", f"variants.{number}", plant.name, expected)
         timeline = Timeline(plant, variant.seed, self.sample_rate_hz, self._steps)
         limits = plant.limits
         speed_hz = timeline.checked_speed(limits.speed_hz if variant.speed_hz is None else variant.speed_hz)

@@ -71,6 +71,8 @@ class Operation:
 
     def _directions(self, plant: Plant, site: str, field: str) -> tuple[Vector, ...]:
         known = hangable_sites(plant)
+        if not known:
+            raise InputError(self.where, field, site, "no added structure: the casing has modes of its own")
         if site not in known:
             raise InputError(self.where, field, site, "one of " + ", ".join(known))
         return site_directions(plant, site)

@@ -11,11 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_sim.carrying import Carrying
+from gearsim_sim.integrate.carrier_kernel import Carrier
 from gearsim_sim.integrate.coefficients import Propagator, make_propagator
 from gearsim_sim.integrate.kernel import pack_constants, pack_state
 from gearsim_sim.integrate.modes import complex_modes
 from gearsim_sim.integrate.pieces import circle_table
 from gearsim_sim.model.assembly import LinearSystem, Vector
+from gearsim_sim.model.carrier import without
 from gearsim_sim.model.loop import MOTION_COLUMNS, make_loop, make_work
 from gearsim_sim.model.loop_data import Data, Drive, Part
 from gearsim_sim.model.mesh_nodes import node_order, node_stride
@@ -78,6 +81,8 @@ class Stepper:
         Steps per output sample.
     probed : bool
         Whether displacements and forces of the interfaces are kept.
+    forces : bool
+        Whether the forces on a carrying structure follow the rows of acceleration.
     """
 
     def __init__(
@@ -88,40 +93,54 @@ class Stepper:
         oversampling: int,
         *,
         probed: bool = False,
+        forces: bool = False,
     ) -> None:
         self._plant = plant
+        inner = plant.internals
         self._schedule = schedule
         self._probed = probed
         self.step = schedule.anchor_step
         self.oversampling = oversampling
         vectors, self.site_rows, rotations = _site_rows(sites)
-        self._rows = _state_rows(plant, probed)
-        parts = [
-            set_up_part(plant.system, names, vectors, schedule.step_s, self._rows) for names in plant.parts
-        ]
+        self._rows = _state_rows(inner, probed)
+        away = () if plant.carrier is None else plant.carrier.dofs
+        own = [without(vector, away) for vector in vectors]
+        parts = [set_up_part(inner.system, names, own, schedule.step_s, self._rows) for names in inner.parts]
         if len(parts) == 1:
-            parts.append(_nothing(plant.system))
+            parts.append(_nothing(inner.system))
         self._parts = (parts[0], parts[1])
         # The loop numbers interfaces part by part.
         self._place = np.argsort(np.concatenate([part.interfaces for part in parts]))
-        self._data = _loop_data(plant, parts, self._place, rotations, schedule.step_s, oversampling)
+        self._carrying = Carrying(plant, schedule.step_s, vectors, self._rows, self._place, forces=forces)
+        self._data = _loop_data(
+            plant, parts, self._carrying.data, self._place, rotations, schedule.step_s, oversampling
+        )
         shape = self._data.bearings.cosines.shape
         sizes = [size for part in parts for size in (part.part.length // 2, part.interfaces.size)]
         # Without rates of the interfaces, with them, and with forces beside the machine's own elements too.
         kinds = ((False, False), (True, False), (True, True))
-        self._loops = [make_loop(*sizes, shape[1], rates, side) for rates, side in kinds]
-        self._side = SideState(plant, [_side_part(part) for part in parts], len(vectors), schedule.step_s)
+        carried = (self._carrying.modes, self._carrying.interfaces)
+        self._loops = [make_loop(*sizes, shape[1], rates, side, *carried) for rates, side in kinds]
+        self.row_count = len(vectors) + self._carrying.data.force_index.size
+        self._side = SideState(inner, [_side_part(part) for part in parts], self.row_count, schedule.step_s)
         self._node_order = node_order(plant)
         self._memory = bearing_memory(self._data.bearings)
-        self.row_count = len(vectors)
         self._state = self._at_rest()
         phases, speed_hz = plant.phases(schedule.turns(self.step)), schedule.segment.speed_hz(self.step)
-        self._side.start(schedule.side_rows(), self._state, phases, self.step, speed_hz)
+        self._side.start(schedule.side_rows(), self._state[:2], phases, self.step, speed_hz)
 
     @property
     def parts(self) -> tuple[PartSetup, ...]:
         """The parts of the system that have degrees of freedom."""
         return tuple(part for part in self._parts if part.propagator is not None)
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Interfaces whose forces on the carrying structure are the last rows, as far as asked for."""
+        carrier = self._plant.carrier
+        if carrier is None or not self._carrying.data.force_index.size:
+            return ()
+        return tuple(self._plant.system.interface_names[index] for index in carrier.interfaces)
 
     @property
     def data(self) -> Data:
@@ -141,23 +160,26 @@ class Stepper:
             schedule.turns(self.step), schedule.segment.speed_hz(self.step), schedule.contributions(self.step)
         )
         u = plant.known_inputs(schedule.segment.load_nm(self.step))
-        rest = static_equilibrium(plant, complex_modes(system), moment, u)
+        rest = static_equilibrium(
+            plant, self._carrying.all_modes(complex_modes(plant.internals.system)), moment, u
+        )
         motion = system.interfaces.T @ rest
         return Rest(rest, plant.interface_forces(motion, np.zeros(motion.size), moment), u)
 
-    def _at_rest(self) -> tuple[Array, Array]:
-        """State of both parts at static equilibrium."""
+    def _at_rest(self) -> tuple[Array, Array, Array]:
+        """State of both parts, and of the structure that carries them, at static equilibrium."""
         rest = self.rest()
-        states = []
+        system, states = self._plant.system, []
+        forces = self._carrying.rest_forces(rest.x, rest.forces)
         for setup in self._parts:
             if setup.propagator is None:
                 states.append(np.zeros(0))
                 continue
-            own = rest.x[setup.dofs]
+            own = rest.x[[system.dof(name) for name in setup.names]]
             z = setup.propagator.modal(own, np.zeros_like(own))
             known = rest.inputs @ setup.part.left_known
-            states.append(pack_state(setup.propagator, z, known, rest.forces[setup.interfaces]))
-        return states[0], states[1]
+            states.append(pack_state(setup.propagator, z, known, forces[setup.interfaces]))
+        return states[0], states[1], self._carrying.at_rest(rest.x, rest.forces)
 
     def compile_all(self) -> None:
         """Compile every variant of the loop (or load it), so that no fault on the way has to wait for it."""
@@ -179,7 +201,7 @@ class Stepper:
         schedule = self._schedule
         drive = schedule.drive()
         fluctuates = schedule.profile.fluctuation_nm is not None
-        return drive, self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
+        return drive, self._side.update(schedule.side_rows(), self._state[:2], fluctuates=fluctuates)
 
     def _run(
         self,
@@ -192,7 +214,7 @@ class Stepper:
         column: int,
     ) -> Array:
         """Let a variant of the loop move `state`; returns its rows at the output samples."""
-        width = MOTION_COLUMNS + len(self._rows) + self._place.size
+        width = MOTION_COLUMNS + len(self._rows) + self._place.size + self._carrying.interfaces
         motion = np.empty((count // self.oversampling + 1, width))
         stride = 1 if side.swings else node_stride(self._node_order, self._schedule.segment)
         work = make_work(self._data, drive, self._place.size)
@@ -206,7 +228,7 @@ class Stepper:
         """Angles from the turns since the anchor and the twist of the encoders, signals, probes."""
         schedule, plant = self._schedule, self._plant
         passed, speed = columns[0], columns[1]
-        given = np.concatenate([part.state_rows for part in self._parts])
+        given = np.concatenate([*(part.state_rows for part in self._parts), self._carrying.state_rows])
         rows = np.empty((given.size, passed.size))
         rows[given] = columns[MOTION_COLUMNS : MOTION_COLUMNS + given.size]
         tracks = [track for track, _ in plant.encoders.values()]
@@ -218,8 +240,10 @@ class Stepper:
         if self._probed:
             count = self._place.size
             displacements, rates = rows[-2 * count : -count], rows[-count:]
-            deviations = columns[MOTION_COLUMNS + given.size :][self._place]
-            forces = self._total_forces(displacements, rates, deviations)
+            behind = columns[MOTION_COLUMNS + given.size :]
+            forces = self._total_forces(displacements, rates, behind[self._place])
+            if plant.carrier is not None:  # so far against the ground
+                displacements[list(plant.carrier.interfaces)] -= behind[count:]
         return Motion(
             turns=schedule.anchor_turns[tracks, None] + whole.astype(np.int64),
             fraction=angle - whole,
@@ -345,6 +369,7 @@ def _side_part(setup: PartSetup) -> SidePart:
 def _loop_data(
     plant: Plant,
     parts: Sequence[PartSetup],
+    carrier: Carrier,
     place: NDArray[np.int64],
     rotations: Array,
     step_s: float,
@@ -354,6 +379,7 @@ def _loop_data(
     return Data(
         first=parts[0].part,
         second=parts[1].part,
+        carrier=carrier,
         bearings=bearing_data(plant, place),
         meshes=mesh_data(plant, place, step_s),
         circle=circle_table(),

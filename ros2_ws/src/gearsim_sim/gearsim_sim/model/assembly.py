@@ -12,6 +12,15 @@ Vector = Mapping[str, float]
 """A direction in the space of the degrees of freedom: name -> coefficient."""
 
 
+def combined(*parts: tuple[Vector, float]) -> Vector:
+    """The sum of directions, each times its factor."""
+    result: dict[str, float] = {}
+    for vector, factor in parts:
+        for name, value in vector.items():
+            result[name] = result.get(name, 0.0) + factor * value
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Elements:
     """Linear springs or dampers one by one: each acts on the elongation `directions[:, i]` . x."""

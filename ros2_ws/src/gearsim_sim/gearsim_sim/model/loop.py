@@ -12,6 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gearsim_sim.integrate.carrier_kernel import (
+    Carrier,
+    carrier_accelerations,
+    carrier_advance,
+    carrier_motion,
+    carrier_state,
+    carry_forces,
+    damper_force,
+    ring_motion,
+)
 from gearsim_sim.integrate.compiled import compiled, inlined
 from gearsim_sim.integrate.kernel import (
     advance,
@@ -89,6 +99,25 @@ def put_states(s: Array, part: Part, row: Array, at: int) -> int:
 
 
 @inlined
+def put_carrier_states(s: Array, carrier: Carrier, row: Array, at: int, nc: int, ni: int) -> int:
+    """State rows of the carrying structure into an output row; returns the place behind them."""
+    for j in range(carrier.state_rows.shape[0]):
+        row[at + j] = carrier_state(s, carrier, j, nc, ni)
+    behind: int = at + carrier.state_rows.shape[0]
+    return behind
+
+
+@inlined
+def put_carrier_motion(
+    s: Array, carrier: Carrier, row: Array, at: int, interfaces: int, nc: int, ni: int
+) -> None:
+    """The structure's motion behind the `interfaces` forces of an output row, which lose their dampers."""
+    for j in range(ni):
+        row[at + carrier.places[j]] -= damper_force(s, j, nc, ni)
+        row[at + interfaces + j] = ring_motion(s, j, nc, ni)
+
+
+@inlined
 def rotate_sites(phases: Array, data: Data, accel: Array, column: int) -> None:
     """Turn pairs of rows (x, y) into the direction of sensors that rotate against the model's frame."""
     for j in range(data.rotations.shape[0]):
@@ -107,20 +136,25 @@ def make_loop(
     balls: int,
     with_rates: bool,
     with_side: bool = False,
+    carrier_modes: int = 0,
+    carrier_interfaces: int = 0,
 ) -> Callable[..., int]:
     """The compiled loop for parts of these (padded) numbers of modes and interfaces, and of balls.
 
     The numbers of the second part may be 0. Rates of the interfaces cost time and are zero unless asked for;
-    forces beside the machine's own elements (`Side`) are not looked at unless asked for.
+    forces beside the machine's own elements (`Side`) are not looked at unless asked for. The last two are
+    those of a structure that carries the bearings, which stand on the ground without.
     """
     n0, n1 = first_modes, second_modes
     i0, i1 = first_interfaces, second_interfaces
     rated = 1 if with_rates else 0
     sided = 1 if with_side else 0
+    nc, ic = carrier_modes, carrier_interfaces
+    carried = 1 if nc > 0 else 0
     q0_count, q1_count = (1 + rated) * i0, (1 + rated) * i1
 
     def run(
-        s0: Array, s1: Array, data: Data, drive: Drive, side: Side, memory: BearingMemory,
+        s0: Array, s1: Array, sc: Array, data: Data, drive: Drive, side: Side, memory: BearingMemory,
         work: Work, first: int, count: int, stride: int, accel: Array, column: int, motion: Array,
     ) -> int:  # fmt: skip
         """Advance from step `first` by `count` steps; returns the number of output samples passed.
@@ -129,7 +163,8 @@ def make_loop(
         the machine's own elements turn its shafts.
 
         accel (site rows, columns) gets `count` columns from `column` on. `motion` (samples,
-        MOTION_COLUMNS + state rows of both parts + interfaces) gets a row at each output sample.
+        MOTION_COLUMNS + state rows of both parts and of the structure + interfaces + motion of the structure)
+        gets a row at each output sample.
         """
         q, rates, forces, phases = work.q, work.rates, work.forces, work.phases
         known0, known1, inputs = work.known0, work.known1, work.inputs
@@ -183,6 +218,8 @@ def make_loop(
                     rates[i0 + j] = s1[q1 + i1 + j]
                 for _ in range(sided):
                     guess_forces(side, q, rates)
+                for _ in range(carried):
+                    carrier_motion(sc, data.carrier, q, nc, ic)
                 bearing_forces(
                     step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
                     data.step_s, balls,
@@ -192,6 +229,8 @@ def make_loop(
                 for _ in range(1 - swings):
                     between_nodes(step - before, stride, data.step_s, nodes, meshes)
                 mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
+                for _ in range(carried):
+                    carry_forces(sc, data.carrier, q, forces, nc, ic)
                 remember_forces(s0, forces, 0, n0, i0)
                 remember_forces(s1, forces, i0, n1, i1)
                 for j in range(accel.shape[0]):
@@ -204,6 +243,8 @@ def make_loop(
                     s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
                     n1, i1,
                 )  # fmt: skip
+                for _ in range(carried):
+                    carrier_accelerations(sc, data.carrier, accel, column + i, nc, ic)
                 for _ in range(1 - sided):
                     advance(s0, data.first.k, forces, 0, n0, i0)
                     advance(s1, data.second.k, forces, i0, n1, i1)
@@ -220,9 +261,15 @@ def make_loop(
                     row[1] = speed
                     at = put_states(s0, data.first, row, MOTION_COLUMNS)
                     at = put_states(s1, data.second, row, at)
+                    for _ in range(carried):
+                        at = put_carrier_states(sc, data.carrier, row, at, nc, ic)
                     for j in range(i0 + i1):
                         row[at + j] = forces[j]
+                    for _ in range(carried):
+                        put_carrier_motion(sc, data.carrier, row, at, i0 + i1, nc, ic)
                     samples += 1
+                for _ in range(carried):
+                    carrier_advance(sc, data.carrier, data.carrier.poles.size // 2, nc, ic)
             before = behind
         return samples
 

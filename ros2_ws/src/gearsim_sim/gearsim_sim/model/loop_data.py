@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_sim.integrate.carrier_kernel import Carrier
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 # Each row of a table of `Drive` begins with the ramp of its severity: from, to, start step, steps.
@@ -75,6 +77,7 @@ class Data(NamedTuple):
 
     first: Part
     second: Part  # without modes and interfaces if the plant has one part only
+    carrier: Carrier  # empty if the bearings stand on the ground
     bearings: Bearings
     meshes: Meshes
     circle: Array  # `pieces.cosine_sine`'s table

@@ -15,8 +15,8 @@ def parallel_shafts(params: ParallelParams, senses: tuple[float, float]) -> tupl
         Coupling(
             near=BEARINGS[0],
             far=BEARINGS[1],
-            driver="theta_f1",
-            driven="theta_s1",
+            driver={"theta_f1": 1.0},
+            driven={"theta_s1": 1.0},
             stiffness_nm_per_rad=model.flywheel_1.stiffness_nm_per_rad,
             torque_per_load=params.speed_ratio,
             drives_shaft=True,
@@ -24,8 +24,8 @@ def parallel_shafts(params: ParallelParams, senses: tuple[float, float]) -> tupl
         Coupling(
             near=BEARINGS[3],
             far=BEARINGS[2],
-            driver="theta_s4",
-            driven="theta_f2",
+            driver={"theta_s4": 1.0},
+            driven={"theta_f2": 1.0},
             stiffness_nm_per_rad=model.flywheel_2.stiffness_nm_per_rad,
             torque_per_load=1.0,
             drives_shaft=False,

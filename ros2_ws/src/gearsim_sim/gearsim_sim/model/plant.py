@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.bearing_seat import BearingSeat
+from gearsim_sim.model.carrier import CarryingStructure, internals
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.gear_mesh import Mesh
 from gearsim_sim.model.gear_wheel import GearWheel
@@ -106,6 +107,8 @@ class Plant:
         What faults of shafts and structure act on; a mount by the name of its bearing.
     wheels : tuple of GearWheel
         Gear wheels whose teeth are known, each in each of its meshes.
+    carrier : CarryingStructure, optional
+        Flexible structure that the bearings stand in; `parts` are then those of the rest.
     """
 
     name: str
@@ -124,6 +127,17 @@ class Plant:
     mounts: Mapping[str, Mount] = field(default_factory=dict)
     wheels: tuple[GearWheel, ...] = ()
     faults_on: bool = True
+    carrier: CarryingStructure | None = None
+
+    @cached_property
+    def internals(self) -> Plant:
+        """The machine without the structure that carries it: bearings stand on the ground."""
+        if self.carrier is None:
+            return self
+        inside = ~np.isin(self.system.dof_names, self.carrier.dofs)
+        return replace(
+            self, system=internals(self.system, self.carrier), rigid=self.rigid[inside], carrier=None
+        )
 
     @cached_property
     def rates(self) -> Array:

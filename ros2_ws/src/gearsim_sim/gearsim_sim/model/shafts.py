@@ -36,8 +36,8 @@ class Coupling:
 
     near: str
     far: str
-    driver: str
-    driven: str
+    driver: Vector
+    driven: Vector
     stiffness_nm_per_rad: float
     torque_per_load: float
     drives_shaft: bool

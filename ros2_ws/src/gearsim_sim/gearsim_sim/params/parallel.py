@@ -22,6 +22,7 @@ from gearsim_sim.model.tooth.pair import GearPair
 from gearsim_sim.model.tooth.stiffness import pair_compliance
 from gearsim_sim.params.bearing import RollingBearing
 from gearsim_sim.params.fields import Count, Strict
+from gearsim_sim.params.finite_shafts import FiniteShafts
 from gearsim_sim.params.parts import Drive, Gear, Pedestal, Seat, Shafts, TorsionalEnd
 from gearsim_sim.params.section import read_model_section
 from gearsim_sim.params.teeth import Teeth
@@ -88,6 +89,13 @@ class GearErrors(Strict):
     """Pitch and surface errors reach this multiple of the tooth mesh order."""
 
 
+class Casing(Strict):
+    """The flexible casing of the models with one."""
+
+    reduced: str
+    """Name of a shipped reduced casing, or path of one from the folder of the machine description."""
+
+
 class Physics(Strict):
     """Off switches, one for each physics."""
 
@@ -125,6 +133,8 @@ class ParallelModel(Strict):
     gear_errors: GearErrors
     ball_bearing: RollingBearing
     pedestal: Pedestal
+    casing: Casing | None = None
+    finite_shafts: FiniteShafts | None = None
     gravity_m_per_s2: Annotated[float, Si("m/s^2", ge=0), Field(alias="gravity")]
     """Acceleration of gravity, against y."""
 

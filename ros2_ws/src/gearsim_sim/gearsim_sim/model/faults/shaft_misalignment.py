@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 
 from gearsim_io.errors import InputError
-from gearsim_sim.model.assembly import Vector
+from gearsim_sim.model.assembly import Vector, combined
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.faults.kind import FaultKind
 from gearsim_sim.model.faults.on_shaft import coupled_shaft_names, shaft_of
@@ -78,13 +78,12 @@ def place(
     forces = _rows(shaft, _on_seats(shaft, coupling, "x", params.overhang_ratio), sign * shaft.sense * fx)
     forces += _rows(shaft, _on_seats(shaft, coupling, "y", params.overhang_ratio), sign * fy)
     k = coupling.stiffness_nm_per_rad
-    return (*forces, *_rows(shaft, {coupling.driver: k, coupling.driven: -k}, twist))
+    return (*forces, *_rows(shaft, combined((coupling.driver, k), (coupling.driven, -k)), twist))
 
 
 def _on_seats(shaft: Shaft, coupling: Coupling, axis: str, overhang: float) -> Vector:
-    near = {dof: (1 + overhang) * share for dof, share in getattr(shaft.planes[coupling.near], axis).items()}
-    far = {dof: -overhang * share for dof, share in getattr(shaft.planes[coupling.far], axis).items()}
-    return near | far
+    near, far = (getattr(shaft.planes[name], axis) for name in (coupling.near, coupling.far))
+    return combined((near, 1 + overhang), (far, -overhang))
 
 
 def _rows(shaft: Shaft, direction: Vector, amplitudes: Spectrum) -> tuple[RotatingForce, ...]:
