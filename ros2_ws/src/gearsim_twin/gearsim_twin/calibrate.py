@@ -15,7 +15,7 @@ from gearsim_twin.causes.prior import LogNormal
 from gearsim_twin.fit import fit_tuning, judged
 from gearsim_twin.likelihood import TAU_FACTOR, Yardstick
 from gearsim_twin.model import Model
-from gearsim_twin.stack import ASSUMED
+from gearsim_twin.stack import ASSUMED, TONES
 from gearsim_twin.systematic import smooth_errors
 from gearsim_twin.tuning import Setting, Tuning
 from gearsim_twin.workbench import Workbench
@@ -32,6 +32,7 @@ TAU_DB = {
     "torsional": 1.5,
     "statistics": 0.4,
     "transient": 1.0,
+    TONES: 1.5,
 }
 """That scatter, as measured between a model and itself with other random errors of teeth and numbers a few
 per cent off: single lines of orders depend on which tooth is how wrong, wide bands do not."""
@@ -59,7 +60,7 @@ class Prior:
         return {
             name: float(np.hypot(SMOOTH_DB, self.tau_db.get(name, TAU_DB[name])))
             for name in domains
-            if name != ASSUMED
+            if name not in (ASSUMED, TONES)
         }
 
     def yard(self, bench: Workbench) -> Yardstick:
@@ -69,7 +70,7 @@ class Prior:
         median = np.array([self._tau(name) for name in stack.domains])
         learnt = [name in self.tau_db for name in stack.domains]
         factor = np.where(learnt, _LEARNT_TAU_FACTOR, TAU_FACTOR)
-        share = np.array([1.0 if name == ASSUMED else _FIRST_SHARE for name in stack.domains])
+        share = np.array([1.0 if name in (ASSUMED, TONES) else _FIRST_SHARE for name in stack.domains])
         spread = np.full(len(stack.domains), SMOOTH_DB)
         return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread))
 

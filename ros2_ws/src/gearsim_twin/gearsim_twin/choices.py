@@ -11,6 +11,8 @@ from gearsim_twin.screen import Screened
 
 __all__ = ["Candidate", "Choice", "Round"]
 
+_HARM_NATS = 2.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
@@ -27,6 +29,8 @@ class Candidate:
         Among all candidates of the round and no further cause.
     gain : Gain or None
         On held-out records; None where nothing was held out or it was never near.
+    proof_nats : float
+        What finding it again in held-out records has added to its odds.
     """
 
     fitted: Fitted
@@ -34,6 +38,11 @@ class Candidate:
     prior_nats: float = 0.0
     probability: float = 0.0
     gain: Gain | None = None
+    proof_nats: float = 0.0
+
+    def holds(self, gain: Gain, trifle_db: float) -> bool:
+        """Whether a gain on held-out records is real; what was found again in them must do no harm."""
+        return gain.real(trifle_db) or (self.proof_nats > 0.0 and gain.nats > -_HARM_NATS)
 
     @property
     def extension(self) -> Extension:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsim_twin.calibrate import Prior
+from gearsim_twin.chain_doubts import chain_doubts
 from gearsim_twin.choices import Candidate, Choice
 from gearsim_twin.compare.discrepancy import Comparison, compare, pooled
 from gearsim_twin.compare.merged import Discrepancy, discrepancies
@@ -64,6 +65,8 @@ def concluded(evidence: Evidence) -> Verdict:
     selection, scores = evidence.selection, evidence.scores
     before = discrepancies(evidence.comparisons(evidence.tuned))
     after = material(discrepancies(evidence.comparisons(evidence.final)))
+    doubts = [chain_doubts(evidence.bench, trial) for trial in (evidence.tuned, evidence.final)]
+    after = (*doubts[1], *after)
     found = [_found(choice, k, selection) for k, choice in enumerate(selection.choices)]
     label = evidence.label
     word = _word(bool(found or label), after)
@@ -72,7 +75,7 @@ def concluded(evidence: Evidence) -> Verdict:
     return Verdict(
         word=word,
         scores=scores,
-        discrepancies=(*(() if label is None else (label.discrepancy,)), *_attributed(evidence, before)),
+        discrepancies=(*_first(label, doubts, selection), *_attributed(evidence, before)),
         remaining=after,
         causes=(*(() if label is None else (label.found,)), *found, *others, *unknown),
         rejected=rejected(selection, {each.name for each in (*others, *([label.found] if label else []))}),
@@ -81,6 +84,18 @@ def concluded(evidence: Evidence) -> Verdict:
         selection=selection,
         remarks=evidence.remarks,
     )
+
+
+def _first(
+    label: Label | None, doubts: Sequence[Sequence[Discrepancy]], selection: Selection
+) -> tuple[Discrepancy, ...]:
+    """What is wrong as a whole: a label, and channels; with the cause after which a channel is right."""
+    left = {each.places[0].channel for each in doubts[1]}
+    name = next((choice.key[0] for choice in selection.choices), None)
+    channels = (
+        replace(each, explained_by=None if each.places[0].channel in left else name) for each in doubts[0]
+    )
+    return (*(() if label is None else (label.discrepancy,)), *channels)
 
 
 def _word(found: bool, rest: Sequence[Discrepancy]) -> Word:

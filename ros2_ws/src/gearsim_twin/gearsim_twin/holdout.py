@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsim_twin.likelihood import Noise, Yardstick
-from gearsim_twin.stack import ASSUMED, Array, Levels, Stack
+from gearsim_twin.stack import ASSUMED, TONES, Array, Levels, Stack
 
 __all__ = ["Gain", "affected_domain", "heldout_gain"]
 
@@ -89,6 +89,7 @@ def heldout_gain(
             rms.append(float(np.sqrt(np.sum(weight * residual[mine] ** 2))))
         nats.append(total[1] - total[0])
         falls.append(rms[0] - rms[1])
+    domain = "orders" if domain == TONES else domain
     return Gain(domain, falls[0], _interval(falls), nats[0], _interval(nats))
 
 

@@ -147,9 +147,16 @@ class Bench:
         pairs = zip(_conditions(self.nominal[one]), _conditions(self.nominal[other]), strict=True)
         return sum(abs(math.log(max(a, 1e-9) / max(b, 1e-9))) for a, b in pairs)
 
-    def context(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
-        """What causes may look at."""
-        records = bench.training
+    def heldout(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
+        """What the finders of causes may look at when they are asked a second time."""
+        (shown,) = bench.trials([trial.model], bench.holdout)
+        return self.context(bench, prior, shown, bench.holdout)
+
+    def context(
+        self, bench: Workbench, prior: Prior, trial: Trial, records: Sequence[int] | None = None
+    ) -> Context:
+        """What causes may look at: records for training, unless others are told."""
+        records = bench.training if records is None else records
         contents = {bench.numbers[k]: trial.model.content(bench.nominal[k]) for k in records}
         shown = [trial.features[k] for k in records]
         tau = prior.tau_of(bench.stack.domains)
@@ -221,8 +228,8 @@ def _judged(
         bench.views[:train], bench.views[train : train + held], causes, bench.plan.frame.window_turns
     )
     others = tuple(cause for cause in causes if label is None or cause.name != label.found.name)
-    context_of = partial(bench.context, work, prior)
-    selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left)
+    context_of, again = (partial(look, work, prior) for look in (bench.context, bench.heldout))
+    selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left, again)
     tell("scoring on held-out records")
     whole = work if bench.search is bench.plan and len(told) == train else None
     whole = whole or bench.workbench(range(train + held), train, bench.plan)

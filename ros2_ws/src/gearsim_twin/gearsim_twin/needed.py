@@ -52,14 +52,14 @@ def needed(
     while True:
         without = [_without(bench, yard, current, k) for k in range(len(choices))]
         leads = [
-            current.evidence - smaller.evidence + choice.candidate.prior_nats
+            current.evidence - smaller.evidence + choice.candidate.prior_nats + choice.candidate.proof_nats
             for smaller, choice in zip(without, choices, strict=True)
         ]
         gains = [gain_between(bench, yard, smaller, current, settings.seed) for smaller in without]
         bad = [
             k
             for k, (lead, gain) in enumerate(zip(leads, gains, strict=True))
-            if lead < settings.convincing_nats or not gain.real(settings.trifle_db)
+            if lead < settings.convincing_nats or not choices[k].candidate.holds(gain, settings.trifle_db)
         ]
         if not bad:
             rows = zip(choices, leads, gains, strict=True)

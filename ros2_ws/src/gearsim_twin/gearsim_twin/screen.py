@@ -38,11 +38,14 @@ class Screened:
         By how much the log likelihood is better than without, at the best strength.
     guesses : int
         How many guesses that cause had.
+    proof_nats : float
+        What finding it again in held-out records adds.
     """
 
     trial: Trial
     nats: float
     guesses: int
+    proof_nats: float = 0.0
 
     @property
     def extension(self) -> Extension:

@@ -19,6 +19,7 @@ from gearsim_twin.contest import contest
 from gearsim_twin.fit import Fitted, judged
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.needed import gain_between, needed, settled
+from gearsim_twin.proof import with_proofs
 from gearsim_twin.screen import Screened, first_guesses, most_hopeful, screen
 from gearsim_twin.settings import Settings
 from gearsim_twin.workbench import Trial, Workbench
@@ -59,6 +60,7 @@ class _Search:
     context_of: Callable[[Trial], Context]
     settings: Settings
     tell: Callable[[str], None]
+    heldout_of: Callable[[Trial], Context] | None
 
     def spent(self) -> bool:
         """Whether the search has cost what it may."""
@@ -74,6 +76,7 @@ def select(
     settings: Settings,
     tell: Callable[[str], None] = lambda _: None,
     content: Callable[[Context], bool] = lambda _: False,
+    heldout_of: Callable[[Trial], Context] | None = None,
 ) -> Selection:
     """Causes that explain what the tuned model misses.
 
@@ -92,8 +95,10 @@ def select(
         Gets a line on what is being done.
     content : callable
         Whether nothing of note is left to be explained: then no further cause is looked for.
+    heldout_of : callable, optional
+        As `context_of`, of the records held out: what is found again in them is proven.
     """
-    search = _Search(bench, causes, context_of, settings, tell)
+    search = _Search(bench, causes, context_of, settings, tell, heldout_of)
     current = tuned
     rounds: list[Round] = []
     choices: list[Choice] = []
@@ -145,12 +150,13 @@ def _round(
     kept = ranked[: search.settings.most_guesses // (2 if rounds else 1)]
     search.tell(f"trying {len(kept)} first guesses")
     screened = screen(search.bench, yard, current, kept, search.spent)
+    screened = _proven(search, current, screened)
     chosen = _worth_fitting(screened, search.settings)
     if chosen:
         search.tell("fitting " + ", ".join(dict.fromkeys(each.extension.cause.name for each in chosen)))
     trials = [each.trial for each in chosen]
     found = contest(search.bench, yard, trials, current.slopes, search.spent) if trials else []
-    fits = [(fitted, each.guesses) for fitted, each in zip(found, chosen, strict=True)]
+    fits = [(fitted, each) for fitted, each in zip(found, chosen, strict=True)]
     yard, current, fits = _same_measure(yard, current, fits)
     candidates = _probable(search.settings, current, fits, names)
     candidates, accepted = _held_out(search, yard, current, candidates, len(rounds))
@@ -160,9 +166,19 @@ def _round(
     return Round(tuple(candidates), left, accepted, untried), yard, current
 
 
+def _proven(search: _Search, current: Fitted, screened: list[Screened]) -> list[Screened]:
+    """The guesses with what finding them again adds, the best first."""
+    heldout_of = search.heldout_of
+    if heldout_of is None:
+        return screened
+    proofs = with_proofs([each.extension for each in screened], lambda: heldout_of(current.trial))
+    found = [replace(each, proof_nats=proof) for each, proof in zip(screened, proofs, strict=True)]
+    return sorted(found, key=lambda each: -(each.nats + each.proof_nats))
+
+
 def _worth_fitting(screened: list[Screened], settings: Settings) -> list[Screened]:
     """The best few, and those that the best may be confused with."""
-    able = [each for each in screened if each.nats > settings.worth_fitting_nats]
+    able = [each for each in screened if each.nats + each.proof_nats > settings.worth_fitting_nats]
     if not able:
         return []
     rivals = {name for name, _ in able[0].extension.cause.confused_with}
@@ -171,8 +187,8 @@ def _worth_fitting(screened: list[Screened], settings: Settings) -> list[Screene
 
 
 def _same_measure(
-    yard: Yardstick, current: Fitted, fits: list[tuple[Fitted, int]]
-) -> tuple[Yardstick, Fitted, list[tuple[Fitted, int]]]:
+    yard: Yardstick, current: Fitted, fits: list[tuple[Fitted, Screened]]
+) -> tuple[Yardstick, Fitted, list[tuple[Fitted, Screened]]]:
     """All judged by the independence of what the best of them leaves."""
     everything = [current, *(each for each, _ in fits)]
     best = max(everything, key=lambda each: each.evidence)
@@ -183,16 +199,19 @@ def _same_measure(
 
 
 def _probable(
-    settings: Settings, current: Fitted, fits: list[tuple[Fitted, int]], names: int
+    settings: Settings, current: Fitted, fits: list[tuple[Fitted, Screened]], names: int
 ) -> list[Candidate]:
     """Candidates with their probabilities, the most probable first."""
-    prior = [settings.prior_nats(names, count) for _, count in fits]
-    leads = [each.evidence - current.evidence + odds for (each, _), odds in zip(fits, prior, strict=True)]
+    prior = [settings.prior_nats(names, guess.guesses) for _, guess in fits]
+    leads = [
+        each.evidence - current.evidence + odds + guess.proof_nats
+        for (each, guess), odds in zip(fits, prior, strict=True)
+    ]
     most = max([0.0, *leads])
     total = math.exp(-most) + sum(math.exp(lead - most) for lead in leads)
     found = [
-        Candidate(each, lead, odds, math.exp(lead - most) / total)
-        for (each, _), lead, odds in zip(fits, leads, prior, strict=True)
+        Candidate(each, lead, odds, math.exp(lead - most) / total, proof_nats=guess.proof_nats)
+        for (each, guess), lead, odds in zip(fits, leads, prior, strict=True)
     ]
     return sorted(found, key=lambda each: -each.lead_nats)
 
@@ -213,6 +232,8 @@ def _held_out(
     passed = (
         k
         for k, each in enumerate(found)
-        if each.lead_nats > least and each.gain is not None and each.gain.real(search.settings.trifle_db)
+        if each.lead_nats > least
+        and each.gain is not None
+        and each.holds(each.gain, search.settings.trifle_db)
     )
     return found, next(passed, None)

@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from gearsim_twin.compare.features import Features
     from gearsim_twin.compare.places import Place
 
-__all__ = ["ASSUMED", "Assumed", "Levels", "Stack", "levels_of", "stack_of"]
+__all__ = ["ASSUMED", "TONES", "Assumed", "Levels", "Stack", "group_of", "levels_of", "stack_of"]
 
 ASSUMED = "assumed"
 """Name of the domain of assumptions."""
+TONES = "tones"
+"""Name of the tones of the domain orders: they belong to no shaft, so no model errs at them by a little."""
 _NO_RECORD = -1
 # Where only the measured record says something the model says that anything may be.
 SILENT_DB = 20.0
@@ -125,6 +127,11 @@ class Stack:
         return Levels(level, std, clear)
 
 
+def group_of(place: Place | Assumed) -> str:
+    """Name of what a place belongs to in a stack: its domain, or `TONES`."""
+    return TONES if place.domain == "orders" and place.kind == "tone" else place.domain
+
+
 def _codes(keys: Sequence[Hashable]) -> Codes:
     numbers: dict[Hashable, int] = {}
     return np.array([numbers.setdefault(key, len(numbers)) for key in keys], dtype=np.intp)
@@ -138,7 +145,8 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
     )
     counts = [len(features.places) for features in measured]
     record = np.repeat([*range(len(measured)), _NO_RECORD], [*counts, len(assumed)]).astype(np.intp)
-    names = tuple(dict.fromkeys(place.domain for place in places))
+    groups = [group_of(place) for place in places]
+    names = tuple(dict.fromkeys(groups))
     at = np.array([place.at for place in places], dtype=np.float64)
     run = _codes([(k, p.domain, p.channel, p.kind) for k, p in zip(record.tolist(), places, strict=True)])
     found = levels_of(measured)
@@ -151,7 +159,7 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
         ),
         domains=names,
         record=record,
-        domain=np.array([names.index(place.domain) for place in places], dtype=np.intp),
+        domain=np.array([names.index(group) for group in groups], dtype=np.intp),
         line=_codes([(place.domain, place.kind, place.at) for place in places]),
         channel=_codes([place.channel for place in places]),
         run=run,

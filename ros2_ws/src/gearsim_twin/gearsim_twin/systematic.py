@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csr_array
 
-from gearsim_twin.stack import ASSUMED, Array, Codes, Stack
+from gearsim_twin.stack import ASSUMED, TONES, Array, Codes, Stack, group_of
 
 __all__ = ["smooth_errors"]
 
@@ -58,7 +58,7 @@ def smooth_errors(stack: Stack, use: np.ndarray, spread_db: Array) -> csr_array:
 
 def _groups(stack: Stack, use: np.ndarray, spread_db: Array) -> Iterator[tuple[Codes, float, int]]:
     """Places with common hats, their spread, and the step; single channels have half of the variance."""
-    kinds = sorted({(p.domain, p.kind) for p in stack.places if p.domain != ASSUMED})
+    kinds = sorted({(p.domain, p.kind) for p in stack.places if group_of(p) not in (ASSUMED, TONES)})
     number: dict[tuple[str, str], int] = {kind: k for k, kind in enumerate(kinds)}
     kind = np.array([number.get((p.domain, p.kind), -1) for p in stack.places], dtype=np.intp)
     for (domain, _), k in number.items():

@@ -56,6 +56,11 @@ class Cause(Protocol):
         What is fitted.
     confused_with : tuple of (str, str)
         Causes that leave much the same traces in one record, and the measurement that would decide.
+
+    Notes
+    -----
+    A cause with an attribute `proven` that is true has a finder with a false alarm rate of its own, and reads
+    all its numbers off the records: it counts as proven when it is found again in held-out records.
     """
 
     name: str

@@ -88,6 +88,7 @@ class Clipping:
     """The end of the range of a sensor or converter."""
 
     name = "clipping"
+    proven = True  # its finder has a false alarm rate of its own
     parameters: tuple[Parameter, ...] = (Parameter("range_m_s2", "m/s^2", LogNormal(50.0, 10.0, 1e-6, 1e6)),)
     confused_with: tuple[tuple[str, str], ...] = (
         ("dropouts", "the waveform itself: a dropout begins and ends anywhere"),

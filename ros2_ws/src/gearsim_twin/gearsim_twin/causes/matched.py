@@ -176,7 +176,8 @@ def _least(context: Context, effect: _Effect, own: Deviation) -> int:
     """Lines that must deviate before anything is simulated; drawn errors of planets let some deviate."""
     if has_planets(context.contents[own.record]) and effect.angle != "none":
         return max(_LEAST_LINES, round(_LEAST_OF_PLANETS * own.values.size))
-    return _LEAST_LINES
+    # What comes once per turn is one line in each channel.
+    return min(_LEAST_LINES, int(own.values.shape[0]))
 
 
 def _by_angle(

@@ -1,0 +1,91 @@
+"""What is found again in held-out records is proven, and a gain that no sensor has is a difference."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gearsim_twin.causes.cause import Parameter
+from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.chain_doubts import chain_doubts
+from gearsim_twin.model import Extension
+from gearsim_twin.proof import REPEATED_NATS, proof_nats, with_proofs
+from gearsim_twin.stack import Assumed
+
+
+class Hum:
+    """Reads an amplitude off whatever it is shown."""
+
+    name = "mains_interference"
+    parameters = (Parameter("size", "1", LogNormal(1.0, 3.0)),)
+    confused_with = ()
+    proven = True
+
+    def __init__(self, proven=True):
+        self.proven = proven
+
+    def applies(self, _):
+        return True
+
+    def starts(self, context):
+        return [{"size": size, "std:size": 0.01} for size in context]
+
+
+def read(size=1.0, proven=True):
+    return Extension(Hum(proven), {"size": size, "std:size": 0.01}, None)
+
+
+def test_what_is_found_again_alike_is_proven_and_its_reading_costs_nothing():
+    extension = read()
+    assert extension.reading_nats > 1.0
+    assert proof_nats(extension, [1.02]) == pytest.approx(REPEATED_NATS + extension.reading_nats)
+    assert proof_nats(extension, [5.0, 1.2]) > 0.0
+
+
+@pytest.mark.parametrize("again", [[], [2.0], [0.4]])
+def test_what_is_not_found_again_or_otherwise_is_not(again):
+    assert proof_nats(read(), again) == 0.0
+
+
+def test_only_causes_with_a_false_alarm_rate_of_their_own_can_be_proven():
+    assert proof_nats(read(proven=False), [1.0]) == 0.0
+    fitted = Extension(Hum(), {"size": 1.0}, None)
+    assert proof_nats(fitted, [1.0]) == 0.0
+
+
+def test_held_out_records_are_looked_at_only_where_somebody_asks():
+    def never():
+        raise AssertionError("asked")
+
+    assert with_proofs([read(proven=False)], never) == [0.0]
+    assert with_proofs([read(proven=False), read()], lambda: [1.0])[1] > 0.0
+
+
+def bench(std_db):
+    channels = ("a", "b")
+    assumed = [Assumed(c, kind, std_db) for c in channels for kind in ("gain", "top", "colour")]
+    return SimpleNamespace(nuisances=SimpleNamespace(assumed=assumed, corrections_db=lambda needs: needs))
+
+
+def doubts(needs, std_db=1.0):
+    return chain_doubts(bench(std_db), SimpleNamespace(nuisance=tuple(needs)))
+
+
+def test_a_gain_of_forty_decibels_is_no_gain():
+    (found,) = doubts([-42.0, 0.0, 0.0, 0.5, 9.0, 9.0])
+    assert (found.size_db, found.z, found.domain) == (-42.0, -42.0, "statistics")
+    assert "level of all that a shows: measured 42.0 dB below the model" in found.words()
+
+
+def test_gains_of_sensors_and_of_unknown_units_are():
+    assert doubts([2.0, 0.0, 0.0, -2.9, 0.0, 0.0]) == ()
+    assert doubts([-42.0, 0.0, 0.0, 0.0, 0.0, 0.0], std_db=10.0) == ()
+    assert chain_doubts(bench(1.0), SimpleNamespace(nuisance=None)) == ()
+
+
+def test_the_worst_comes_first():
+    found = doubts([5.0, 0.0, 0.0, -8.0, 0.0, 0.0])
+    assert [each.id for each in found] == ["g1", "g2"]
+    assert np.allclose([each.z for each in found], [-8.0, 5.0])
