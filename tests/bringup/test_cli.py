@@ -34,6 +34,7 @@ def gearsim(*words: str, cwd=None) -> subprocess.CompletedProcess[str]:
         (EnvironmentLackError("no compiler", "apt-get install g++"), 3, "apt-get install g++"),
         (JobFailedError("the simulator ended early"), 1, "the simulator ended early"),
         (OSError(28, "No space left on device"), 1, "No space left on device"),
+        (PermissionError(13, "Permission denied", "/x/y"), 1, "gearsim: /x/y: Permission denied"),
         (BagError("x.png: the viewer drew nothing"), 1, "gearsim: x.png: the viewer drew nothing"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (click.UsageError("no such option"), 2, "no such option"),

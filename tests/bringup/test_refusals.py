@@ -51,6 +51,14 @@ def files(tmp_path):
             "simulate quick --seconds 1 --out {0}/taken",
             "taken: got a folder that exists already, expected the",
         ),
+        (
+            "simulate quick --seconds 1 --out {0}/a.csv/x",
+            "/a.csv is a file, expected the name of a new folder",
+        ),
+        ("run quick --record {0}/a.csv/x", "/a.csv is a file, expected the name of a new bag"),
+        ("view {0}/taken --out {0}/a.csv/x.rrd", "/a.csv is a file, expected the name of a new file"),
+        ("import {0}/a.csv --machine mfpt --out {0}/a.csv/x", "/a.csv is a file, expected the name of a new"),
+        ("monitoring --out {0}/a.csv/x", "/a.csv is a file, expected the name of a folder"),
         ("run heathy", "did you mean healthy?"),
         (
             "run quick --record {0}/taken",

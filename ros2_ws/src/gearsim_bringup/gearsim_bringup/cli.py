@@ -121,6 +121,8 @@ def _report(error: Exception) -> int:
     from gearsim_bringup.ui import JobFailedError
     from gearsim_io.bags import BagError
 
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return _complain(f"{error.filename}: {error.strerror}", FAILED)
     if isinstance(error, (JobFailedError, BagError, OSError)):
         return _complain(str(error), FAILED)
     folder = Path(os.environ.get("GEARSIM_STATE", ".gearsim")) / "log"

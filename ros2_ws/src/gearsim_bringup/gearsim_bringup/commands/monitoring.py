@@ -22,7 +22,9 @@ prometheus --config.file=out/monitoring/prometheus.yml    # beside ./gearsim run
 def command(out: Path, overwrite: bool, json_mode: bool) -> None:
     """Write out the settings for Prometheus, Grafana and ROS 2's diagnostic_aggregator."""
     from gearsim_bringup.monitoring.files import FILES, write_files
+    from gearsim_io.new_paths import check_place
 
+    check_place(out, "the name of a folder")
     voice = Voice(json_mode=json_mode)
     paths = write_files(out, overwrite=overwrite)
     for path in paths:

@@ -24,13 +24,6 @@ def check_folder(folder: Path) -> None:
         If something of that name exists, or what is above it is no folder or may not be written to.
     """
     refuse_existing(folder, _EXPECTED)
-    if folder.is_symlink():
-        raise InputError(str(folder), "", "a link that leads nowhere", _EXPECTED)
-    above = next(parent for parent in folder.absolute().parents if parent.exists())
-    if not above.is_dir():
-        raise InputError(str(folder), "", f"{above} is a file", _EXPECTED)
-    if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError(str(folder), "", f"{above} may not be written to", _EXPECTED)
 
 
 def placed(folder: Path, files: dict[str, str]) -> tuple[Path, ...]:

@@ -13,7 +13,7 @@ from gearsim_io.importers.build import import_file, machine_for
 from gearsim_io.importers.content import stem_of
 from gearsim_io.importers.settings import Overrides
 from gearsim_io.machines import load_machine
-from gearsim_io.new_paths import refuse_existing
+from gearsim_io.new_paths import check_place, refuse_existing
 from gearsim_io.record import Record
 
 _BATCH_SAMPLES = 4096
@@ -61,6 +61,7 @@ def import_to_bag(
     target = Path(out)
     paths = [Path(file) for file in files]
     nameplate = load_machine(machine)
+    check_place(target, "the name of a new bag")
     records = [import_file(path, machine, overrides) for path in paths]
     places = [target] if len(paths) == 1 else [target / stem_of(path) for path in paths]
     for path, place in zip(paths, places, strict=True):
