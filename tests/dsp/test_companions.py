@@ -140,3 +140,17 @@ def test_what_is_louder_at_the_first_bearing_is_a_companion():
     assert _companion(3.93, 0.3, {"ch_1": 1.0, "ch_2": 0.5})
     assert heard_at(_evidence(3.93, 0.3, {"ch_1": 1.0, "ch_2": 0.5}), ("ch_2",), ("ch_1",)) == 0.5
     assert heard_at(_evidence(3.93, 0.3, {"ch_1": 1.0}), ("ch_2",), ("ch_1",)) == 1.0
+
+
+def test_a_bearing_that_hardly_hears_its_lines_is_not_the_one_that_makes_them():
+    """A seventeenth of the power elsewhere is too little; a third is what casings pass on of their own."""
+    plate = _plate(3.93)
+    for here, found in ((0.06, []), (0.3, [("bearing_2", "outer_race")])):
+        rng = np.random.default_rng(1)
+        turns = turns_of(SPEED, 4.0, RATE)
+        bad = defect(rng, turns, RATE, 3.93, slip=0.002).x
+        data = np.stack(
+            [0.02 * noise(rng, turns.size) + bad, 0.02 * noise(rng, turns.size) + np.sqrt(here) * bad]
+        )
+        verdict = verdict_of(data, RATE, plate, Signal(bad, RATE, turns).tacho())
+        assert [(f.component, f.fault) for f in verdict.findings] == found

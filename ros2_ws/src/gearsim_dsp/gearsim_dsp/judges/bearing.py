@@ -23,7 +23,7 @@ import numpy as np
 from gearsim_dsp.bands import Band
 from gearsim_dsp.evidence import EvidencePool
 from gearsim_dsp.families import FamilyEvidence, FamilySearch
-from gearsim_dsp.judges.companions import accompanies, is_companion
+from gearsim_dsp.judges.companions import accompanies, heard_at, is_companion
 from gearsim_dsp.judges.confidence import confidence
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import FaultFamily, fault_families
@@ -46,6 +46,9 @@ DOMINANCE_LIMIT = 1.6
 _MOST_FINDINGS = 4
 _CAGE_FUNDAMENTAL_DB = 10.0
 _SAME_COMB = 3e-3
+# Power of the lines at the bearing over that at the loudest place elsewhere: 180 simulated spalls have 0.34
+# and more, what is told in a bearing that is sound 0.09 and less.
+_LEAST_HEARD = 0.2
 # Of a family's lines from pure rolling: the eleven measured records have 0.22 % on average and up to 0.58 %;
 # taken half again as wide, as they are of three rigs.
 _MEAN_DEVIATION = 0.0035
@@ -131,11 +134,14 @@ def _stands(
     findings: list[Finding],
     resolution: float,
 ) -> bool:
-    """True for a fault that is no companion of one found before."""
+    """True for a fault that its bearing's own channels hear, and that is no companion of one found before."""
     best = _best(judged)
     if not is_fault(best):
         return False
     component = _component(machine, group, judged)[0].component
+    own = [e.channel for e in judged if e.channel in machine.bearing(component).channels]
+    if own and heard_at(judged, own, [e.channel for e in judged if e.channel not in own]) < _LEAST_HEARD:
+        return False
     return not any(is_companion(machine, component, judged, best, one, resolution) for one in findings)
 
 
