@@ -1,4 +1,4 @@
-"""Draws registered pictures into a folder."""
+"""Draws registered pictures into a folder: those of the methods, and those of the stories."""
 
 from __future__ import annotations
 
@@ -11,21 +11,28 @@ from matplotlib.figure import Figure
 from gearsim_bringup.method_figures import FIGURES
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_bringup.method_figures.style import save, styled
+from gearsim_bringup.stories import STORIES
 from gearsim_io.errors import InputError
 
-__all__ = ["drawer", "make_figures"]
+__all__ = ["KINDS", "drawer", "make_figures"]
+
+KINDS = {"methods": ("method_figures", FIGURES), "stories": ("stories", STORIES)}
+"""Package and names of the pictures of docs/methods and of docs/stories.md."""
 
 
-def drawer(name: str) -> Callable[[Measured], Figure]:
+def drawer(name: str, kind: str = "methods") -> Callable[[Measured], Figure]:
     """The function `draw(records)` of a registered picture, imported now."""
-    if name not in FIGURES:
-        raise InputError("method figures", "name", name, f"one of {', '.join(FIGURES)}")
-    draw = import_module(f"gearsim_bringup.method_figures.{name}").draw
+    package, names = KINDS[kind]
+    if name not in names:
+        raise InputError(f"figures of {kind}", "name", name, f"one of {', '.join(names)}")
+    draw = import_module(f"gearsim_bringup.{package}.{name}").draw
     assert callable(draw)
     return draw  # type: ignore[no-any-return]
 
 
-def make_figures(out: Path, only: tuple[str, ...], progress: Callable[[int, int, str], None]) -> list[Path]:
+def make_figures(
+    out: Path, only: tuple[str, ...], progress: Callable[[int, int, str], None], kind: str = "methods"
+) -> list[Path]:
     """Draw the pictures into the folder `out`.
 
     Parameters
@@ -36,6 +43,8 @@ def make_figures(out: Path, only: tuple[str, ...], progress: Callable[[int, int,
         Names of pictures; all if empty.
     progress : callable
         Called with what is done, how much there is, and the name at hand.
+    kind : str
+        A key of `KINDS`.
 
     Returns
     -------
@@ -49,7 +58,7 @@ def make_figures(out: Path, only: tuple[str, ...], progress: Callable[[int, int,
     EnvironmentLackError
         When a record is not in any data folder.
     """
-    chosen = [(name, drawer(name)) for name in only or FIGURES]
+    chosen = [(name, drawer(name, kind)) for name in only or KINDS[kind][1]]
     out.mkdir(parents=True, exist_ok=True)
     records = Measured()
     files = []

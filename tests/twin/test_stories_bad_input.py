@@ -1,0 +1,85 @@
+"""Measured records that cannot be judged as asked: what is refused, and what can still be done."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.io
+
+from gearsim_io.errors import InputError
+from gearsim_io.importers import Overrides
+from gearsim_twin.baseline import scenario_content
+from gearsim_twin.case import load_case
+
+pytestmark = pytest.mark.records
+
+
+@pytest.fixture
+def outer(record_file):
+    return record_file("mfpt/OuterRaceFault_vload_1.mat")
+
+
+@pytest.fixture
+def rewritten(outer, tmp_path):
+    """A stretch of that record, in a file of its own."""
+
+    def write(first, end, gain=1.0):
+        bearing = scipy.io.loadmat(outer)["bearing"]
+        content = {name: bearing[name][0, 0] for name in ("sr", "load", "rate")}
+        content["gs"] = gain * bearing["gs"][0, 0].ravel()[first:end]
+        scipy.io.savemat(tmp_path / "again.mat", {"bearing": content})
+        return tmp_path / "again.mat"
+
+    return write
+
+
+@pytest.mark.parametrize(("first", "end", "gain"), [(0, None, 1.0), (20000, 100000, 1.0), (0, None, 9.80665)])
+def test_a_record_to_train_on_is_not_held_out(outer, rewritten, first, end, gain):
+    """Nor a copy of it, an excerpt, or one in another unit."""
+    with pytest.raises(InputError, match=r"--holdout.*once more.*nothing is fitted to"):
+        load_case([outer], "mfpt", "bearing5", holdout=[rewritten(first, end, gain)])
+
+
+def test_a_record_too_short_tells_what_would_do(rewritten):
+    with pytest.raises(
+        InputError, match=r"length: got 0\.184 s, expected at least 1\.19 s.*or 0\.395 s with"
+    ):
+        load_case([rewritten(0, 9000)], "mfpt", "bearing5")
+
+
+def test_a_model_of_another_kind_of_machine_tells_which_would_do(outer):
+    with pytest.raises(InputError, match="describes mfpt: one of bearing2, bearing4, bearing5"):
+        load_case([outer], "mfpt", "lpm34")
+
+
+def test_a_speed_that_the_drive_cannot_do_is_another_machine(outer):
+    case = load_case([outer], "mfpt", "bearing5", overrides=Overrides(speed_hz=90.0))
+    with pytest.raises(InputError, match=r"90 Hz.*at most 60 Hz.*it is another machine"):
+        scenario_content(case, case.views()[0])
+
+
+def test_a_file_of_another_rig_is_no_file_of_this_one(outer):
+    with pytest.raises(InputError, match=r"X\*_DE_time: got not in the file.*the file has bearing\.gs"):
+        load_case([outer], "cwru_drive_end", "bearing5")
+
+
+def test_without_any_speed_it_says_what_can_still_be_done(tmp_path):
+    """The turbine's nameplate has no speed, and noise has no lines."""
+    file = tmp_path / "noise_25600.csv"
+    np.savetxt(file, np.random.default_rng(1).standard_normal(82000))
+    case = load_case([file], "wt_hss", "lpm34")
+    words = r"speed: got none.*--speed; without one `gearsim diagnose` still tells impulses"
+    with pytest.raises(InputError, match=words):
+        scenario_content(case, case.views()[0])
+    told = load_case([file], "wt_hss", "lpm34", overrides=Overrides(speed_hz=20.0))
+    assert scenario_content(told, told.views()[0])["operating_point"]["speed"]["value"] == 20.0
+
+
+def test_an_unknown_unit_leaves_shapes(record_file):
+    case = load_case([record_file("hit_sm/SQ_OR2_1200.mat")], "hit_sq", "bearing5")
+    assert not case.levels_known
+    assert any("works on shapes and ratios" in remark for remark in case.remarks)
+    stated = load_case(
+        [record_file("hit_sm/SQ_OR2_1200.mat")], "hit_sq", "bearing5", overrides=Overrides(unit="g")
+    )
+    assert stated.levels_known
