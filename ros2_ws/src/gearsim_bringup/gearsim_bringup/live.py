@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,7 @@ _READY_S = 150.0
 # are lost and the next come after 3 s: so the run keeps looking.
 _DISCOVERY_S = 1.0
 _PATIENCE_S = 60.0
+_INTERRUPTED = (130, -signal.SIGINT)
 _WATCHERS = 1  # this process hears the alarms itself
 
 
@@ -130,6 +132,8 @@ class LiveRun:
         failed = graph.failed()
         if failed is None:
             return
+        if failed.returncode() in _INTERRUPTED:  # Ctrl-C reached the node before it reached this process
+            raise KeyboardInterrupt
         words = failed.last_words()
         if failed.returncode() == 2:
             name, _, rest = words.partition(": ")
