@@ -2,6 +2,8 @@
 
     python -m blind.calibrate [rig ...]      (from tests/twin, with the packages of ros2_ws on the path)
 
+An effect is tried at a middle size, then where a line of 20 dB per decade would put the middle target, and
+once more; the sizes of all targets lie on the line through what was found. What is in the file already stays.
 Its seed is no other's.
 """
 
@@ -9,6 +11,7 @@ from __future__ import annotations
 
 import json
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -20,36 +23,52 @@ from gearsim_io.errors import InputError
 
 TARGETS_DB = (6.0, 12.0, 24.0)
 _SEED = 990_001
-_STEPS = 5
-_SLACK_DB = 2.0  # by which the smallest size that is tried may stand out more than asked for
 _SECONDS = {"parallel": 0.8, "bearing": 1.2, "planetary": 1.2}
+_TRIES = 3
+_SLOPES = (8.0, 40.0)  # dB per decade, of what grows at all
+_NOTHING_DB = 2.0  # less may as well be chance
 
 
-def sizes_for(rig: str, name: str) -> tuple[list[float | None], list[float]]:
-    """Three sizes (None where none of the tried does), and the dB at all that were tried."""
+def sizes_for(rig: str, name: str) -> tuple[list[float | None], list[tuple[float, float]]]:
+    """Three sizes (None where it takes one out of bounds), and what was found: pairs of size and dB."""
     effect = EFFECTS[name]
-    grid = np.geomspace(effect.low, effect.high, _STEPS)
-    found = np.array(_grid_db(rig, name, grid.tolist()))
-    grid, found = grid[: found.size], np.maximum.accumulate(found)
-    rising = found + 1e-9 * np.arange(found.size)
-    sizes = np.exp(np.interp(TARGETS_DB, rising, np.log(grid)))
-    told = [
-        float(f"{s:.3g}") if found[0] - _SLACK_DB <= t <= found[-1] else None
-        for s, t in zip(sizes, TARGETS_DB, strict=True)
-    ]
-    return told, [round(float(f), 1) for f in found]
-
-
-def _grid_db(rig: str, name: str, grid: list[float]) -> list[float]:
-    """What was found at ascending sizes, up to the first that the machine cannot have."""
-    noise = EFFECTS[name].noise.get(rig, 1.0)
-    plain, found = _data(rig, (), noise), list[float]()
-    for size in grid:
+    low, high = np.log10(effect.low), np.log10(effect.high)
+    noise = effect.noise.get(rig, 1.0)
+    plain, found = _data(rig, (), noise), list[tuple[float, float]]()
+    at = 0.5 * (low + high)
+    for _ in range(_TRIES):
         try:
-            found.append(stands_out_db(plain, _data(rig, ((name, size),), noise), RIGS[rig].rate_hz))
-        except InputError:
+            data = _data(rig, ((name, float(10**at)),), noise)
+        except InputError:  # more than the machine can have
+            high = 0.5 * (at + low) if not found else max(place for place, _ in found)
+            at = high
+            continue
+        db = stands_out_db(plain, data, RIGS[rig].rate_hz)
+        found.append((at, db))
+        if abs(db - TARGETS_DB[1]) < 1.0:
             break
-    return found
+        missing = TARGETS_DB[1] - db if db > _NOTHING_DB else 2 * TARGETS_DB[1]
+        at = float(np.clip(at + missing / _slope(found), low, high))
+        if any(abs(at - place) < 0.02 for place, _ in found):
+            break
+    sizes = [_size(found, target, low, high) for target in TARGETS_DB]
+    return sizes, [(float(f"{10**place:.3g}"), round(db, 1)) for place, db in found]
+
+
+def _slope(found: list[tuple[float, float]]) -> float:
+    """dB per decade through the two points that are nearest to the middle target."""
+    if len(found) < 2:
+        return 20.0
+    (x0, y0), (x1, y1) = sorted(found, key=lambda one: abs(one[1] - TARGETS_DB[1]))[:2]
+    return float(np.clip((y1 - y0) / (x1 - x0), *_SLOPES)) if abs(x1 - x0) > 0.05 else 20.0
+
+
+def _size(found: list[tuple[float, float]], target: float, low: float, high: float) -> float | None:
+    place, db = min(found, key=lambda one: abs(one[1] - target))
+    if db < _NOTHING_DB:
+        return None
+    at = place + (target - db) / _slope(found)
+    return float(f"{10**at:.3g}") if low - 0.1 <= at <= high + 1e-6 else None
 
 
 def _data(rig: str, effects: tuple[tuple[str, float], ...], noise: float) -> np.ndarray:
@@ -59,17 +78,16 @@ def _data(rig: str, effects: tuple[tuple[str, float], ...], noise: float) -> np.
 
 def main() -> None:
     """Of all rigs, or of those that are named."""
-    content = (
-        json.loads(SIZES.read_text(encoding="utf-8")) if SIZES.is_file() else {"sizes": {}, "grid_db": {}}
-    )
-    content["targets_db"] = TARGETS_DB
+    content: dict[str, Any] = {"targets_db": TARGETS_DB, "sizes": {}, "found": {}}
+    if SIZES.is_file():
+        content |= json.loads(SIZES.read_text(encoding="utf-8"))
     for rig in sys.argv[1:] or RIGS:
         for name, effect in EFFECTS.items():
             if rig not in effect.rigs or effect.given or name in content["sizes"].get(rig, {}):
                 continue
             sizes, found = sizes_for(rig, name)
             content["sizes"].setdefault(rig, {})[name] = sizes
-            content["grid_db"].setdefault(rig, {})[name] = found
+            content["found"].setdefault(rig, {})[name] = found
             SIZES.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
             print(rig, name, sizes, found, flush=True)
 

@@ -56,7 +56,7 @@ RIGS = {
     one.name: one
     for one in (
         Rig(
-            "parallel", "unsw_parallel", "lpm34", 16384.0, 8, 3.0, 10.0, 50.0,
+            "parallel", "unsw_parallel", "lpm34", 16384.0, 8, 2.5, 10.0, 50.0,
             ("b1_y", "b3_y", "b3_x"), "input", 8, (2e-3, 2e-3, 5e-4),
             {
                 "mesh.mean_stiffness": 0.03,
@@ -72,8 +72,8 @@ RIGS = {
             },
         ),
         Rig(
-            "bearing", "mfpt", "bearing5", 32768.0, 4, 2.5, 25.0, 0.0,
-            ("accel",), "shaft", 8, (1e-3,),
+            "bearing", "mfpt", "bearing5", 32768.0, 4, 1.6, 25.0, 0.0,
+            ("accel",), "shaft", 8, (2e-4,),
             {
                 "bearing.youngs_modulus": 0.03,
                 "bearing.radial_clearance": 0.05,
@@ -84,7 +84,7 @@ RIGS = {
             },
         ),
         Rig(
-            "planetary", "unsw_planetary", "planetary18", 16384.0, 8, 4.0, 32 / 15, 46.875,
+            "planetary", "unsw_planetary", "planetary18", 16384.0, 8, 3.2, 32 / 15, 46.875,
             ("ring", "carrier", "sun"), "carrier", 60, (2e-3, 5e-3, 3e-3),
             {
                 "mesh.mean_stiffness": 0.03,
