@@ -27,7 +27,7 @@ from gearsim_twin.compare.merged import discrepancies
 from gearsim_twin.conclude import Evidence, concluded
 from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
-from gearsim_twin.fit import fit_tuning
+from gearsim_twin.fit import fit_tuning, judged
 from gearsim_twin.labels import speed_label
 from gearsim_twin.measuring_chain import measuring_chain
 from gearsim_twin.model import Model
@@ -224,6 +224,8 @@ def _judged(
     yard = prior.yard(work)
     tell("tuning the model")
     tuned = fit_tuning(work, yard, Model(prior.tuning, prior.tuning.nominal))
+    yard = yard.by_independence(tuned.posterior.residual_db, tuned.trial.levels, tuned.posterior.noise)
+    tuned = judged(yard, tuned.trial, tuned.slopes)
     label = speed_label(
         bench.views[:train], bench.views[train : train + held], causes, bench.plan.frame.window_turns
     )

@@ -35,7 +35,8 @@ _T_CONST = float(gammaln((_NU + 1) / 2) - gammaln(_NU / 2) - 0.5 * np.log(_NU * 
 WIDE_DB = 20.0
 # What is wholly absent is as wrong as it can be.
 MOST_DB = 40.0
-_OUTLYING = np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+# Of all places those that anything may explain: were it many, no cause could explain a few lines better.
+_OUTLYING = np.array([0.003, 0.01, 0.03])
 # Within which the scatter of levels at single places about a good model is known beforehand.
 TAU_FACTOR = 1.6
 _TAU_STEPS = np.linspace(-2.5, 3.0, 12)

@@ -20,6 +20,11 @@ NU = 5.0
 """Degrees of freedom of Student's t: heavier tails than any domain showed on replicates."""
 RATIO_DB = 6.0
 """A line off its place by the width at which lines part counts as much as one too weak by half."""
+# Degrees of freedom by which a single place is told: with those of the density a line would need twelve
+# standard deviations. On replicates nothing is told either way (test_replicates).
+# Degrees of freedom by which a single place is told: with those of the density a line would need twelve
+# standard deviations. On replicates nothing is told either way.
+_NU_TOLD = 8.0
 _DEFAULT_TAU_DB = 1.0
 _T_CONST = math.lgamma((NU + 1) / 2) - math.lgamma(NU / 2) - 0.5 * math.log(NU * math.pi)
 
@@ -167,6 +172,6 @@ def significant(comparison: Comparison, false_share: float = 0.01) -> NDArray[np
     index = np.flatnonzero(comparison.counted)
     if index.size == 0:
         return out
-    p = 2 * stats.t.sf(np.abs(comparison.z[index]), NU)
+    p = 2 * stats.t.sf(np.abs(comparison.z[index]), _NU_TOLD)
     out[index] = stats.false_discovery_control(p, method="bh") <= false_share
     return out
