@@ -54,7 +54,7 @@ def test_it_learns_the_standing_discrepancy_and_tells_a_new_one(rig, tmp_path):
 
 def test_bad_models_are_told_in_one_line(rig):
     for values, words in (
-        ({}, "parameter.model: got nothing"),
+        ({}, "model: got nothing, expected a scenario"),
         ({"model": "nonsense"}, "got nonsense"),
     ):
         node = rig.domain.start_node(TWIN, values)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsim_io.nameplate import Machine
+from gearsim_twin.calibrate import SMOOTH_DB
 from gearsim_twin.compare.chains import Nuisance
 from gearsim_twin.compare.discrepancy import Comparison, compare, pooled
 from gearsim_twin.compare.places import Place
@@ -135,8 +136,13 @@ def exhibit_of(bench: Bench, work: Workbench, selection: Selection, seed: int) -
         *((each.cause.name, each.words.get("component", "")) for each in final.extensions),
     ]
     measured = [work.measured[k] for k in work.holdout]
+    yard = selection.yard
+    tau_db = {
+        name: float(np.hypot(SMOOTH_DB, median))
+        for name, median in zip(yard.stack.domains, yard.tau_median_db, strict=True)
+    }
     steps = tuple(
-        Step(*name, pooled([compare(work.measured[k], trial.features[k]) for k in work.holdout]))
+        Step(*name, pooled([compare(work.measured[k], trial.features[k], tau_db) for k in work.holdout]))
         for name, trial in zip(names, trials, strict=True)
     )
     sides = {

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 from gearsim_twin.compare.merged import Discrepancy
 
-__all__ = ["describe_rest", "material"]
+__all__ = ["LEAST_DB", "LEAST_Z", "describe_rest", "material"]
 
 _MOST = 8
 # A difference of a few decibels at one place is what models of machines err by.
-_LEAST_DB, _LEAST_Z = 3.0, 4.0
+LEAST_DB, LEAST_Z = 3.0, 4.0
 
 
 def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
     """Discrepancies that are too large and too sure for a good model's own errors, the surest first."""
-    return tuple(each for each in discrepancies if abs(each.size_db) >= _LEAST_DB and abs(each.z) >= _LEAST_Z)
+    return tuple(each for each in discrepancies if abs(each.size_db) >= LEAST_DB and abs(each.z) >= LEAST_Z)
 
 
 def describe_rest(rest: Sequence[Discrepancy]) -> str:

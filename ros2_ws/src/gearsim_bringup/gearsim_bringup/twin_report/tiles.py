@@ -12,6 +12,7 @@ from gearsim_twin.compare.discrepancy import Comparison, significant
 from gearsim_twin.compare.merged import base
 from gearsim_twin.compare.places import DOMAINS, Place, hz_text
 from gearsim_twin.exhibit import Exhibit
+from gearsim_twin.words import LEAST_DB, LEAST_Z
 
 __all__ = ["Tile", "TileRow", "legend", "tile_rows"]
 
@@ -44,7 +45,7 @@ class TileRow:
 def tile_rows(exhibit: Exhibit) -> list[TileRow]:
     """Rows by domain: what differs for sure in either model, and a little of what agrees."""
     first, last = exhibit.steps[0].comparison, exhibit.steps[-1].comparison
-    sure = [significant(each) for each in (first, last)]
+    sure = [_sure(each) for each in (first, last)]
     found: list[TileRow] = []
     # Last what has columns of its own.
     for domain in sorted(DOMAINS, key=lambda name: name == "torsional"):
@@ -63,6 +64,12 @@ def tile_rows(exhibit: Exhibit) -> list[TileRow]:
             ]
             found.append(TileRow(domain_name(domain), _what(first, rows), channels, *tiles))
     return found
+
+
+def _sure(comparison: Comparison) -> np.ndarray:
+    """Places that differ for sure, by more than a good model errs by: what counts in the verdict."""
+    large = (np.abs(comparison.difference_db) >= LEAST_DB) & (np.abs(comparison.z) >= LEAST_Z)
+    return np.asarray(large & significant(comparison))
 
 
 def _worst(sides: Sequence[Comparison], sure: Sequence[np.ndarray], rows: list[int]) -> float:
@@ -133,4 +140,4 @@ def legend() -> Iterator[tuple[str, str]]:
     """Labels and colours that explain the tiles."""
     for size in (-20.0, -6.0, 6.0, 20.0):
         yield f"{size:+.0f} dB".replace("-", "−"), _style(size, sure=True)
-    yield "may be chance", _style(0.0, sure=False)
+    yield "may be chance, or small", _style(0.0, sure=False)
