@@ -71,7 +71,7 @@ def test_a_kind_tells_where_it_can_be_how_great_and_what_shows_it():
     (section,) = sections("outer_race_spall")
     places = {place.machine: place for place in section.places}
     rig = places["unsw_parallel"]
-    assert rig.models == ("lpm22", "lpm34")
+    assert rig.models == ("lpm22", "lpm34", "cb146", "cb182")
     assert rig.components == ("bearing_1", "bearing_2", "bearing_3", "bearing_4")
     limits = dict(rig.limits)
     assert set(limits) == {"width_m", "depth_m", "row"}
@@ -82,9 +82,10 @@ def test_a_kind_tells_where_it_can_be_how_great_and_what_shows_it():
     assert changed.components == ("planet_1_bearing", "planet_2_bearing", "planet_3_bearing")
     text = markdown([section], whole=False)
     assert (
-        "| unsw_parallel | lpm22, lpm34 | bearing_1, bearing_2, bearing_3, bearing_4 | `width_m` less" in text
+        "| unsw_parallel | lpm22, lpm34, cb146, cb182 | bearing_1, bearing_2, bearing_3, bearing_4 "
+        "| `width_m` less" in text
     )
-    assert "Shown by: `cage_slip`, `demo`, " in text
+    assert "Shown by: `cage_slip`, `casing_outer`, `demo`, " in text
     assert section.content()["places"][0]["limits"]["row"] == "1 to 1"
 
 

@@ -12,6 +12,8 @@ from gearsim_twin.tuning import tuning_of
 MACHINES = {
     "lpm22": "unsw_parallel",
     "lpm34": "unsw_parallel",
+    "cb146": "unsw_parallel",
+    "cb182": "unsw_parallel",
     "planetary18": "unsw_planetary",
     "bearing2": "mfpt",
     "bearing4": "mfpt",

@@ -72,6 +72,14 @@ def _parallel_shaft(scenario: Scenario, *, pedestals: bool) -> Any:
     return params.model_copy(update={"pedestals": pedestals})
 
 
+def _in_casing(scenario: Scenario, *, finite: bool) -> Any:
+    from gearsim_sim.params.casing_gearbox import load_casing_gearbox_params
+
+    return load_casing_gearbox_params(
+        scenario.machine_path, scenario.parameters, scenario.source, finite=finite
+    )
+
+
 def _planetary(scenario: Scenario) -> Any:
     from gearsim_sim.params.planetary import load_planetary_params
 
@@ -92,6 +100,8 @@ _PARAMETERS: Mapping[str, Callable[[Scenario], Any]] = {
     "lpm22": partial(_parallel_shaft, pedestals=False),
     "lpm34": partial(_parallel_shaft, pedestals=True),
     "planetary18": _planetary,
+    "cb146": partial(_in_casing, finite=False),
+    "cb182": partial(_in_casing, finite=True),
 }
 
 
@@ -112,6 +122,7 @@ def _engine(scenario: Scenario) -> RunningModel:
         speed_hz=None if scenario.operation.profile.trace else scenario.speed_hz,
         load_nm=scenario.load_nm,
         operation=scenario.operation,
+        looked_at=[site for row in scenario.sensors.accelerometers for site, _ in row.looks_at],
     )
 
 

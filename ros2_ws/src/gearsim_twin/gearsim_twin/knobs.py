@@ -70,6 +70,8 @@ _RIG = (
 KNOBS: dict[str, tuple[Knob, ...]] = {
     "lpm22": _GEARBOX,
     "lpm34": (*_GEARBOX, *_PEDESTAL),
+    "cb146": _GEARBOX,
+    "cb182": _GEARBOX,
     "planetary18": _PLANETARY,
     "bearing2": _RIG,
     "bearing4": (*_RIG, *_PEDESTAL[:3]),

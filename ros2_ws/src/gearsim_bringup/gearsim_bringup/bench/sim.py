@@ -41,6 +41,7 @@ def measure(voice: Voice) -> Iterator[Figure]:
         Goal(">=", 25),
         (_RK45, bench.rk45_real_time_factor(params=planetary)),
     )
+    yield from _casings()
     equal, own = (bench.ensemble_real_time_factor(own_matrices=own) for own in (False, True))
     yield Figure(
         "sim.ensemble.gearboxes_per_core", equal, "gearboxes", Goal(">=", 30), ("one engine", factor)
@@ -51,6 +52,23 @@ def measure(voice: Voice) -> Iterator[Figure]:
     yield Figure("sim.startup_s", bench.startup_seconds(), "s", Goal("<=", 3))
     yield Figure("sim.memory_slope", bench.memory_slope_mb_per_minute(), "MB/min", Goal("<=", 0.5))
     yield from _ross(voice, factor)
+
+
+def _casings() -> Iterator[Figure]:
+    """The gearbox in its flexible casing, one accelerometer on it and eight bearing forces put out."""
+    for name, finite in (("cb146", False), ("cb182", True)):
+        params = bench.casing_params(finite=finite)
+        factor, plain = bench.casing_real_time_factor(params), bench.rk45_real_time_factor(params=params)
+        yield Figure(f"sim.{name}.rtf", factor, "x", Goal(">=", 8), (_RK45, plain))
+    params = bench.casing_params(finite=False)
+    yield Figure("sim.alias_db.cb146_4x", bench.casing_alias_db(params, 4), "dB", Goal("<=", -70))
+    yield Figure(
+        "sim.alias_db.cb146_8x",
+        bench.casing_alias_db(params, 8),
+        "dB",
+        Goal("<=", -80),
+        ("2 steps per sample", bench.casing_alias_db(params, 2)),
+    )
 
 
 def _ross(voice: Voice, factor: float) -> Iterator[Figure]:

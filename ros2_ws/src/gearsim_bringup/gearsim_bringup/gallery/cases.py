@@ -52,8 +52,11 @@ def _case(kind: str, scenarios: list[Scenario]) -> Case:
     showing = [one for one in scenarios if any(fault.kind == kind for fault in faults_of(one))]
     if not showing:
         raise InputError("gallery", "only", kind, "a kind that a shipped scenario shows")
-    # The scenario named after the kind, else the one with the fewest other faults.
-    example = min(showing, key=lambda one: (one.name != kind, len(faults_of(one)), one.name))
+    # Named after the kind, else that with the fewest other faults; flexible casings come last.
+    example = min(
+        showing,
+        key=lambda one: (one.name != kind, one.model in ("cb146", "cb182"), len(faults_of(one)), one.name),
+    )
     mine = [fault for fault in faults_of(example) if fault.kind == kind]
     others = tuple(fault for fault in example.faults if fault.kind != kind)
     quiet = dataclasses.replace(example.with_events([]), sensors=_ideal(example.sensors))

@@ -68,7 +68,8 @@ def load_casing_gearbox_params(
         raise InputError(gearbox.where, "casing", "nothing", "a section with a reduced casing")
     if finite and gearbox.model.finite_shafts is None:
         raise InputError(gearbox.where, "finite_shafts", "nothing", "a section with the shafts' dimensions")
-    path, _ = read_machine_file(machine)
+    replaced = overrides is not None and "casing.reduced" in overrides
+    beside = Path(source) if replaced else read_machine_file(machine)[0]
     name = named.reduced
-    own = str(Path(path).parent / name) if name.endswith(".npz") else name
+    own = str(beside.parent / name) if name.endswith(".npz") else name
     return CasingGearboxParams(gearbox, find_reduced(own), finite)

@@ -93,7 +93,7 @@ class Casing(Strict):
     """The flexible casing of the models with one."""
 
     reduced: str
-    """Name of a shipped reduced casing, or path of one from the folder of the machine description."""
+    """Name of a shipped reduced casing, or path of one (.npz) from the folder of the file that names it."""
 
 
 class Physics(Strict):
