@@ -91,7 +91,8 @@ def rest(verdict: Verdict) -> tuple[list[str], int]:
 def _sentence(verdict: Verdict, found: Found) -> str:
     """ "The model misses lines at 48.4 Hz and multiples: rolling elements slip by ...; the error falls." """
     mine = [each for each in verdict.discrepancies if each.explained_by == found.name]
-    first = next((each for each in mine if each.domain == found.domain), mine[0] if mine else None)
+    # The surest of its domain in which the record has more: what the model misses, and not what that drowns.
+    first = min(mine, key=lambda each: (each.domain != found.domain, each.size_db < 0), default=None)
     where = "The model misses " if first is None else f"The model misses {first.where}: "
     numbers = "; ".join(f"{parameter_name(each.name)} {quantity(each)}" for each in found.parameters)
     told = f" ({numbers}, 95 %)" if numbers else ""
