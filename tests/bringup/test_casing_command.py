@@ -18,8 +18,8 @@ def coarse(tmp_path: Path) -> str:
     text = (FOLDER / "unsw_casing.yaml").read_text()
     for old, new in (
         ("name: unsw_casing", "name: coarse"),
-        ("plate_size: {value: 7,", "plate_size: {value: 25,"),
-        ("ring_size: {value: 7,", "ring_size: {value: 20,"),
+        ("plate_size: {value: 7.5,", "plate_size: {value: 25,"),
+        ("ring_size: {value: 7.5,", "ring_size: {value: 20,"),
         ("ring_layers: {value: 4,", "ring_layers: {value: 1,"),
     ):
         assert old in text
@@ -52,7 +52,7 @@ def test_build_writes_what_reduce_reads(coarse, tmp_path, capsys):
 
 def test_sensors_anywhere_come_into_the_file(coarse, tmp_path, capsys):
     file = tmp_path / "reduced.npz"
-    sensor = ["--sensor", "lid:0,0.19,0.06:y"]
+    sensor = ["--sensor", "lid:0,0.095,0.06:y"]
     assert main(["casing", "reduce", coarse, "--modes", "10", *sensor, "--out", str(file)]) == 0
     assert "lid" in capsys.readouterr().out
     site = load_reduced(file).site("lid")

@@ -27,6 +27,7 @@ def test_pairs_keep_their_order_and_find_what_was_measured():
         model = np.sort(model * (1 + rng.normal(0, 0.03, 40)))
         pairs = pair_in_order(model)
         assert (np.diff(pairs.modes) > 0).all()
+        assert pairs.modes[0] == 1
         assert np.abs(pairs.modes - numbers).max() <= 2
         # No single pair can be bettered between its neighbours.
         price = 0.01 * (pairs.modes - numbers)

@@ -76,8 +76,8 @@ def test_more_modes_bring_it_nearer_and_residual_vectors_still_more(exact):
         return float(np.abs(reduction.frequencies_hz[6:36] / full - 1).max())
 
     plain = [worst(modes, 0) for modes in (40, 60, 120)]
-    assert plain[0] > 1.5 * plain[1] > 3 * plain[2]
-    assert worst(60, 12) < plain[2]
+    assert plain[0] > plain[1] > plain[2]
+    assert worst(60, 12) < plain[1] / 3
 
 
 def test_the_independent_check_of_craig_bampton_models_is_clean(free, tmp_path):
@@ -145,15 +145,18 @@ def test_sites_are_rows_of_the_whole(free):
         assert site.correction @ motion == pytest.approx(moved, rel=1e-9)
 
 
-def test_forces_at_bearings_move_sensors_as_in_the_full_model(free):
+def test_forces_at_bearings_move_everything_as_in_the_full_model(free):
+    """With hysteretic damping (8 % of the stiffness), so that no frequency is too near to a resonance."""
     structure = small_structure(free=True)
     force = np.zeros(structure.size)
     force[structure.masters["b3"][1]] = 1.0
-    for frequency in (40.0, 0.4 * free.valid_hz):
+    for frequency in (40.0, 0.2 * free.valid_hz, 0.4 * free.valid_hz):
         square = (2 * np.pi * frequency) ** 2
-        full = spsolve((structure.stiffness - square * structure.mass).tocsc(), force)
-        reduced = np.linalg.solve(free.stiffness - square * free.mass, free_force(free, force))
-        assert np.abs(free.expand(reduced) - full).max() < 0.03 * np.abs(full).max()
+        full = spsolve((structure.stiffness * (1 + 0.08j) - square * structure.mass).tocsc(), force)
+        dynamic = free.stiffness * (1 + 0.08j) - square * free.mass
+        moved = free.expand(np.linalg.solve(dynamic, free_force(free, force)))
+        # Own frequencies off by 0.3 % move the response at resonance by 2 * 0.003 / 0.08.
+        assert np.abs(moved - full).max() < 0.075 * np.abs(full).max()
 
 
 def free_force(reduction, force):

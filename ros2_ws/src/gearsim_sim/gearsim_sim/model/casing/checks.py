@@ -121,7 +121,7 @@ def _reference_checks(elastic_hz: Array) -> Iterator[Check]:
     off = np.abs(pair_in_order(elastic_hz).deviations)
     detail = f"17 frequencies, the worst off by {100 * off.max():.1f} %"
     # The thesis's own model before updating.
-    yield _percent("modal test of the thesis, mean", float(off.mean()), 4.5, detail)
+    yield _percent("modal test of the thesis, mean", float(off.mean()), 4.2, detail)
 
 
 def _shipped_check(params: CasingParams) -> Check:

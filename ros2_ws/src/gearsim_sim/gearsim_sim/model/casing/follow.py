@@ -71,6 +71,28 @@ class Leftover:
         squares, mix = scipy.linalg.eigh(stiffness, mass) if chosen.size else (np.zeros(0), np.zeros((0, 0)))
         return chosen @ mix, squares
 
+    def most_below(self, square: float, boundary: Array, squares: Array, coupling: Array) -> int:
+        """At most so many eigenvalues of the whole structure lie below `square`, which is below the cut-off.
+
+        Those of the kept modes, and the negative ones of the masters' dynamic stiffness (Sylvester's law;
+        Wittrick and Williams, 1971). To the latter each mode left out adds `-square^2 a a' / (lambda_d -
+        square)`; all of them together no more than the three moments known and a bound of the rest.
+
+        Parameters
+        ----------
+        square : float
+        boundary : Array, shape (masters, masters)
+            Stiffness less `square` times mass of the masters alone.
+        squares, coupling : Array, shape (modes,), (modes, masters)
+            Of the kept modes.
+        """
+        rest = self.cutoff / (self.cutoff - square)
+        added = self.stiffness + square * self.mass + square**2 * rest * self.follow
+        added = added + coupling.T @ (coupling / (squares - square)[:, None])
+        scale = 1 / np.sqrt(np.abs(np.diag(boundary)) + square**2 * np.abs(np.diag(added)))
+        values = np.linalg.eigvalsh((boundary - square**2 * added) * scale[:, None] * scale)
+        return int(np.sum(squares < square) + np.sum(values < 0))
+
     def errors(self, squares: Array, masters: Array, amplitudes: Array, shapes: Array) -> Array:
         """Relative error of each frequency, an upper one to first order; NaN from the cut-off on.
 

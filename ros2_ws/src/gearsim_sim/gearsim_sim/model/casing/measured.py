@@ -2,7 +2,7 @@
 
 The thesis prints frequencies, not shapes, so pairs cannot be made by MAC. They are made by order: the
 thesis's own finite-element model says how many modes lie below each measured one, and a pair may deviate from
-that number by `SHIFT` at a price.
+that number by `SHIFT` at a price. The first pair may not: neither the test nor that model has a lower mode.
 """
 
 from __future__ import annotations
@@ -63,6 +63,7 @@ def pair_in_order(elastic_hz: Array) -> Pairs:
     steps = np.arange(len(elastic_hz))[None] - (numbers[:, None] - 1)
     costs = (elastic_hz[None] / measured[:, None] - 1) ** 2 + (PRICE * steps) ** 2
     costs[np.abs(steps) > SHIFT] = np.inf
+    costs[0, 1:] = np.inf
     best, back = costs[0], []
     for row in costs[1:]:
         before = np.concatenate([[-1], _argmin_so_far(best)[:-1]])

@@ -6,8 +6,9 @@ the number of modes asked for, some residual vectors (see `follow`). What is lef
 acceleration without delay at low frequency, `- D u_m''` with `D = K_ss^-1 A - Phi Lambda^-1 Phi' A` and
 `A = M_sm + M_ss Psi`: the correction of sensors.
 
-How many residual vectors there are is chosen so that the reduction is valid as far up as possible: to the
-first own frequency whose estimated error exceeds `ACCURACY`, or to the first mode left out.
+How many residual vectors there are is chosen so that the reduction is valid as far up as possible: every mode
+of the whole structure below `valid_hz` has its counterpart within `ACCURACY`. That is certain, not estimated:
+eigenvalues of the whole structure are counted, see `Leftover.most_below`.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from gearsim_sim.model.casing.structure import Structure
 
 # Largest error of an own frequency, relative, up to each frequency [Hz]; the last one holds beyond too.
 ACCURACY = ((1000.0, 0.001), (2000.0, 0.003), (4000.0, 0.006))
+
+# Eigenvalues below that of 1 Hz are those of rigid-body motion, which is exact.
+_RIGID = (2 * np.pi) ** 2
 
 Tell = Callable[[str, float], None]
 
@@ -54,7 +58,7 @@ class Reduction:
     frequencies_hz: Array
     """Own frequencies of the reduced structure."""
     errors: Array
-    """Estimated upper error of each of them, relative; NaN from the cut-off on."""
+    """Estimated error of each of them as a mode of the whole, relative; NaN from the cut-off on."""
     valid_hz: float
     held: Cells
     """Rows of the masters' displacements."""
@@ -75,7 +79,8 @@ class Reduction:
 
     def expand(self, coordinates: Array) -> Array:
         """Displacements of the whole structure from reduced coordinates, shape (size, ...)."""
-        whole = np.zeros((len(self.held) + len(self.others), *coordinates.shape[1:]))
+        size = len(self.held) + len(self.others)
+        whole = np.zeros((size, *coordinates.shape[1:]), dtype=coordinates.dtype)
         count = len(self.held)
         whole[self.held] = coordinates[:count]
         whole[self.others] = self.static @ coordinates[:count] + self.shapes @ coordinates[count:]
@@ -133,13 +138,8 @@ class _Choice:
     errors: Array
     squares: Array
     cutoff: float
-
-    @property
-    def valid(self) -> float:
-        """Eigenvalue up to which it holds."""
-        frequencies = np.sqrt(np.maximum(self.squares, 0)) / (2 * np.pi)
-        bad = np.flatnonzero(~(self.errors <= allowed_errors(frequencies)))
-        return min(self.cutoff, float(self.squares[bad[0]])) if len(bad) else self.cutoff
+    valid: float
+    """Eigenvalue up to which it holds."""
 
 
 class _Work:
@@ -177,7 +177,30 @@ class _Work:
         squares, vectors = reduced_modes(mass, stiffness)
         count = len(m_bb)
         errors = left.errors(squares, vectors[:count], vectors[count + kept :], combinations)
-        return _Choice(kept, combinations, mass, stiffness, errors, squares, left.cutoff)
+        valid = self._valid(left, kept, (m_bb, k_bb), squares)
+        return _Choice(kept, combinations, mass, stiffness, errors, squares, left.cutoff, valid)
+
+    def _valid(self, left: Leftover, kept: int, boundary: tuple[Array, Array], squares: Array) -> float:
+        """Up to here the whole structure has no mode that the reduced one misses by more than is allowed.
+
+        Eigenvalues of the reduced structure are never too low. The k-th one is low enough if no more than k
+        of the whole structure lie below it less what is allowed.
+        """
+        mass, stiffness = boundary
+        own = self.squares[:kept], self.pull[:kept]
+
+        def most_below(square: float) -> int:
+            return left.most_below(square, stiffness - square * mass, *own)
+
+        allowed = allowed_errors(np.sqrt(np.maximum(squares, 0)) / (2 * np.pi))
+        sure = 0.0
+        for k, least in enumerate((squares * (1 - allowed) ** 2).tolist()):
+            if least >= left.cutoff:
+                break
+            if squares[k] > _RIGID and most_below(least) > k:
+                return _last(most_below, k, sure, least)
+            sure = max(sure, least)
+        return sure
 
     def _importance(self, m_bb: Array, k_bb: Array, kept: int) -> Array:
         """Motions of the masters in own modes without residual vectors, scaled so that errors count alike."""
@@ -212,6 +235,14 @@ class _Work:
             shapes=shapes,
             delayed=-delayed,
         )
+
+
+def _last(count: Callable[[float], int], most: int, low: float, high: float) -> float:
+    """The largest value whose count is at most `most`, between one where it is and one where it is not."""
+    while high - low > 1e-6 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if count(middle) <= most else (low, middle)
+    return low
 
 
 class _Parts:
