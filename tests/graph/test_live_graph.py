@@ -67,6 +67,23 @@ def test_run_ends_with_ctrl_c_and_leaves_a_sound_bag(ros_domain, tmp_path):
     assert len(messages(bag, qos.ACCEL.full_name)) > 10
 
 
+def test_record_ends_with_ctrl_c_and_leaves_a_sound_bag(ros_domain, tmp_path):
+    assert ros_domain
+    words = [sys.executable, "-m", "gearsim_bringup.cli", "record", "--out", "bag"]
+    process = subprocess.Popen(
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env={**os.environ}, cwd=tmp_path
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "recording to" in line and "recorder" in line:  # the node itself, not yet the command
+            break
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1] == "gearsim: interrupted"
+    assert messages(tmp_path / "bag", qos.ACCEL.full_name) == []
+
+
 def test_a_second_rig_in_the_same_domain_is_refused(ros_domain, tmp_path):
     first = ros_domain.start_node("gearsim_sim.nodes.simulator", {"scenario": "quick"})
     first.wait_for("scenario quick", timeout_s=200)  # it may have to compile first

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +16,7 @@ from types import TracebackType
 ParameterValue = str | int | float | bool | Sequence[str]
 _PR_SET_PDEATHSIG = 1
 _ON_ITS_WAY_S = 0.3
+_INTERRUPTED = 130
 _STOP_STEPS = ((signal.SIGINT, 8.0), (signal.SIGTERM, 4.0), (signal.SIGKILL, 4.0))
 
 
@@ -41,6 +42,20 @@ class NodeSpec:
     def command(self) -> list[str]:
         """The whole command line."""
         return [sys.executable, "-m", self.module, *self.arguments()]
+
+
+def run_here(main: Callable[..., int], spec: NodeSpec) -> int:
+    """Run a node in this process, by its `main`; the exit status.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If a signal ended it, once it has ended in good order.
+    """
+    status = main(["gearsim", *spec.arguments()], told_status=_INTERRUPTED)
+    if status == _INTERRUPTED:
+        raise KeyboardInterrupt
+    return status
 
 
 class NodeProcess:

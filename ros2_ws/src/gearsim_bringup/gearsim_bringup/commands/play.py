@@ -9,7 +9,7 @@ import click
 from gearsim_bringup.monitoring.choice import Choice
 from gearsim_bringup.monitoring.options import monitor_options
 from gearsim_bringup.options import ANY_PATH, FiniteRange, example
-from gearsim_bringup.processes import NodeSpec
+from gearsim_bringup.processes import NodeSpec, run_here
 
 EXAMPLE = """
 ./gearsim play out/my_bag
@@ -41,8 +41,7 @@ def command(
     if not (diagnose or choice.model):
         from gearsim_io.nodes.player import main
 
-        spec = player(bag, rate=rate, loop=loop, listeners=0, signals_only=False)
-        return int(main(["gearsim", *spec.arguments()]))
+        return run_here(main, player(bag, rate=rate, loop=loop, listeners=0, signals_only=False))
     source = player(bag, rate=rate, loop=loop, listeners=choice.listeners, signals_only=True)
     _judge(bag, source, choice)
     return 0

@@ -23,7 +23,7 @@ EXAMPLE = """
 @click.option("--all", "everything", is_flag=True, help="Every topic there is.")
 def command(out: Path, topics: tuple[str, ...], everything: bool) -> int:
     """Record the rig's topics into a bag until Ctrl-C."""
-    from gearsim_bringup.processes import NodeSpec, ParameterValue
+    from gearsim_bringup.processes import NodeSpec, ParameterValue, run_here
     from gearsim_io.nodes.recorder import main
 
     values: dict[str, ParameterValue] = {
@@ -32,4 +32,4 @@ def command(out: Path, topics: tuple[str, ...], everything: bool) -> int:
         "all_topics": everything,
     }
     click.echo(f"recording to {out}; Ctrl-C ends it", file=sys.stderr)
-    return int(main(["gearsim", *NodeSpec("recorder", "", values).arguments()]))
+    return run_here(main, NodeSpec("recorder", "", values))

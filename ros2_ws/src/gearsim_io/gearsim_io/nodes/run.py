@@ -22,10 +22,12 @@ WAKE_S = 0.1
 PATIENCE_S = 1.0
 
 
-def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | None = None) -> int:
+def run_node(
+    make_node: Callable[[], Node], name: str, args: Sequence[str] | None = None, *, told_status: int = 0
+) -> int:
     """Spin the node that `make_node` makes, in a single-threaded executor.
 
-    SIGINT and SIGTERM end it with status 0, and a node ends by itself when it sets its attribute
+    SIGINT and SIGTERM end it with `told_status`, and a node ends by itself when it sets its attribute
     `exit_status` to a number; before the end its method `finish()`, if it has one, is called while the
     node can still publish. A signal more than a second after the first ends the process at once (not
     earlier: Ctrl-C often reaches a process twice, from the terminal and from its parent).
@@ -40,6 +42,8 @@ def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | Non
         Who speaks in error messages.
     args : sequence of str, optional
         Command line, the process's own by default.
+    told_status : int
+        What is returned after a signal; 0, as a node that is told to stop has done its job.
     """
     stopping = False
     told_s = 0.0
@@ -78,4 +82,4 @@ def run_node(make_node: Callable[[], Node], name: str, args: Sequence[str] | Non
             rclpy.try_shutdown()
         for number, handler in previous.items():
             signal.signal(number, handler)
-    return getattr(node, "exit_status", None) or 0
+    return getattr(node, "exit_status", None) or (told_status if stopping else 0)
