@@ -150,4 +150,5 @@ def test_the_page_counts_lost_cases_as_wrong_and_says_when_there_are_few() -> No
     assert "named first | 1 of 2 (50.0 %" in text
     assert "are fewer than the 300" in text
     assert "too late" in text
+    assert "seed 1: cases 0, 9" in text
     assert "| unbalance | unbalance 1, (not done) 1 |" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -32,7 +33,11 @@ def page(results: Sequence[Result], when: str, command: str) -> str:
 
 def _head(results: Sequence[Result], when: str, command: str) -> str:
     seeds = sorted({one["seed"] for one in results})
-    ranges = ", ".join(f"seed {s}: {sum(one['seed'] == s for one in results)} cases" for s in seeds)
+    ranges = "; ".join(
+        f"seed {s}: {_numbers([one['index'] for one in results if one['seed'] == s])}" for s in seeds
+    )
+    counted = Counter(one["rig"] for one in results)
+    rigs = ", ".join(f"{name} {n}" for name, n in counted.most_common())
     few = (
         f"\n\n**{len(results)} cases are fewer than the {_FEW} that are asked for: the intervals say how "
         "sure the shares are.**"
@@ -42,7 +47,8 @@ def _head(results: Sequence[Result], when: str, command: str) -> str:
     levels = ", ".join(f"{db:g}" for db in TARGETS_DB)
     return f"""# Blind tests of the judge
 
-Written by `{command}`, nothing by hand. {len(results)} cases ({ranges}), run {when}.{few}
+Written by `{command}`, nothing by hand. {len(results)} cases ({ranges}), run {when};
+by rig: {rigs}.{few}
 
 Each case is a machine with something hidden in it, or with nothing, made by a simulator that is not the
 product's (`tests/twin/blind`): Runge-Kutta of fourth order at 131 kHz, numbers of the machine some per cent
@@ -52,6 +58,17 @@ is `gearsim twin`, in a process that sees the records only; each file it opens i
 (`tests/twin/blind/severity.py`; labels, gains, clipping, roll-off, floor and play have given sizes).
 `oil_film` is not among the effects: on sound bearings it shows nothing. Shares are given with Wilson's
 interval of 95 %. A case that ends without a verdict counts as wrong."""
+
+
+def _numbers(indices: Sequence[int]) -> str:
+    """Numbers of cases, neighbours joined: 0-3, 7."""
+    parts: list[list[int]] = []
+    for index in sorted(indices):
+        if parts and index == parts[-1][-1] + 1:
+            parts[-1].append(index)
+        else:
+            parts.append([index])
+    return "cases " + ", ".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)
 
 
 def _goals(results: Sequence[Result]) -> str:
