@@ -65,7 +65,8 @@ def _of_meshes(machine: Machine) -> Iterator[KnownOrder]:
 def _of_stages(machine: Machine) -> Iterator[KnownOrder]:
     for stage in machine.planetary_stages:
         orders = planetary_orders(machine, stage)
-        yield KnownOrder(0.5 * orders.mesh, "half", f"0.5 x mesh {stage.name}", 3.5)
+        # A multiple of slower shafts, so that it is never told as a tone: misfits of models show there.
+        yield KnownOrder(0.5 * orders.mesh, "half", f"0.5 x mesh {stage.name}", 1.8)
         yield KnownOrder(orders.planet_pass, "carrier", f"planet pass of {stage.name}", 1.5)
         for k in range(1, _MESH_HARMONICS + 1):
             name = f"{k} x mesh {stage.name}"
