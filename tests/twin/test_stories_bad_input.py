@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.io
 
 from gearsim_io.errors import InputError
-from gearsim_io.importers import Overrides
+from gearsim_io.importers import Overrides, import_file
+from gearsim_io.machines import load_machine, machine_file
 from gearsim_twin.baseline import scenario_content
-from gearsim_twin.case import load_case
+from gearsim_twin.case import load_case, make_case
+from gearsim_twin.causes import CAUSES
+from gearsim_twin.causes.context import Context
+from gearsim_twin.simulated import Simulator
 
 pytestmark = pytest.mark.records
 
@@ -83,3 +89,21 @@ def test_an_unknown_unit_leaves_shapes(record_file):
         [record_file("hit_sm/SQ_OR2_1200.mat")], "hit_sq", "bearing5", overrides=Overrides(unit="g")
     )
     assert stated.levels_known
+
+
+def test_a_record_of_another_machine_is_called_so(record_file):
+    """The bench gearbox of 32 teeth at 30 Hz, said to be the wind turbine's stage of 22."""
+    bench = import_file(record_file("sq_gearbox/h30hz0.csv.gz"), "sq_gearbox")
+    said = dataclasses.replace(
+        bench, data=bench.data[:1], channels=("accel",), unit="1", notes={}, machine=""
+    )
+    case = make_case(load_machine("wt_hss"), machine_file("wt_hss"), "lpm34", [said])
+    views = case.views()[:1]
+    content = scenario_content(case, views[0])
+    with Simulator(case, 1, case.views()) as simulator:
+        shown = tuple(simulator.views({0: content}, 4.0))
+    seen = Context(case, views, (), (), (), (content,), shown)
+    (start,) = CAUSES["mislabelled_record"].starts(seen)
+    # Both machines that it could be have 32 teeth on the reference shaft.
+    assert start["component"] in ("unsw_parallel", "sq_gearbox")
+    assert "the record is of another machine" in CAUSES["mislabelled_record"].signature(start)
