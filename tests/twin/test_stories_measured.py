@@ -23,6 +23,9 @@ from gearsim_bringup.stories import (
     mfpt_slip,
     turbine,
 )
+from gearsim_twin.case import load_case
+from gearsim_twin.causes import CAUSES
+from gearsim_twin.stated import score_stated
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -174,6 +177,31 @@ def test_gear0_explained_and_unexplained_parts_are_the_same_on_the_last_third(re
     again = sum(min(abs(line - other) for other in told.strange_again) < 0.012 for line in told.strange)
     assert again >= 3
     assert all(abs(2 * line - round(2 * line)) > 0.04 for line in told.strange)
+
+
+def spall(component, width_m):
+    return CAUSES["bearing_spall_outer"], {"component": component, "width_m": width_m}
+
+
+@pytest.mark.records
+def test_a_spall_and_other_dimensions_mend_the_envelope_of_cwru(record_file):
+    """On the last third; the model's resonances are not those of the motor, so that most of it stays."""
+    case = load_case([record_file(cwru_race.RECORD)], "cwru_drive_end", "bearing5")
+    geometry = {"diameter_ratio_change": -0.0131, "rolling_elements": 9.0, "by": "element_diameter"}
+    built = (CAUSES["bearing_geometry"], {"component": "drive_end", "told": "element_diameter", **geometry})
+    models = {"nominal": [], "extended": [spall("drive_end", 4e-4), built]}
+    scores = score_stated(case, models, seconds=3.0).by_domain["envelope"].models
+    assert scores["extended"].value < scores["nominal"].value - 1.5
+
+
+@pytest.mark.records
+def test_a_spall_learnt_under_two_loads_gains_under_the_third(record_file):
+    files = [record_file(f"mfpt/OuterRaceFault_vload_{k}.mat") for k in (1, 3, 5)]
+    case = load_case(files[:2], "mfpt", "bearing5", holdout=files[2:])
+    scores = score_stated(case, {"nominal": [], "spall": [spall("test_bearing", 3e-4)]}, seconds=2.0)
+    for domain, least_db in (("envelope", 0.3), ("cyclic", 0.5)):
+        models = scores.by_domain[domain].models
+        assert models["spall"].value < models["nominal"].value - least_db, domain
 
 
 def test_every_story_has_its_section_and_its_picture():
