@@ -1,7 +1,7 @@
 """The baseline of everyday practice: levels in third-octave bands and the crest, against the nominal model.
 
-It says whether something differs, and nothing more. Its threshold was set on machines without effects of
-other seeds than are judged: some one in fifty of them is to alarm.
+It says whether something differs, and nothing more. The threshold of a rig is 1.2 dB over the largest difference
+that was found on ten machines without effects (four, three and three of the rigs, seeds 990100 and following).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from blind.rigs import Rig
 
 Array = NDArray[np.float64]
 _LOWEST_HZ = 40.0
-THRESHOLD_DB = {"parallel": 6.0, "bearing": 9.0, "planetary": 6.0}
+THRESHOLD_DB = {"parallel": 5.1, "bearing": 6.3, "planetary": 14.5}
 
 
 def bands_db(x: Array, rate_hz: float) -> Array:
