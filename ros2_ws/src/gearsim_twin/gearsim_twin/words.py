@@ -14,8 +14,16 @@ LEAST_DB, LEAST_Z = 3.0, 4.0
 
 
 def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
-    """Discrepancies that are too large and too sure for a good model's own errors, the surest first."""
-    return tuple(each for each in discrepancies if abs(each.size_db) >= LEAST_DB and abs(each.z) >= LEAST_Z)
+    """Discrepancies that are too large and too sure for a good model's own errors, the surest first.
+
+    A floor between lines of modulation is none by itself: where noise and a quiet model share a band, how they
+    beat is told to some ten decibels only.
+    """
+    return tuple(
+        each
+        for each in discrepancies
+        if abs(each.size_db) >= LEAST_DB and abs(each.z) >= LEAST_Z and each.places[0].kind != "floor"
+    )
 
 
 def describe_rest(rest: Sequence[Discrepancy]) -> str:
