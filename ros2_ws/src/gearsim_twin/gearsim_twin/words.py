@@ -16,8 +16,8 @@ LEAST_DB, LEAST_Z = 3.0, 4.0
 def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
     """Discrepancies that are too large and too sure for a good model's own errors, the surest first.
 
-    A floor between lines of modulation is none by itself: where noise and a quiet model share a band, how they
-    beat is told to some ten decibels only.
+    A floor between lines of modulation is none by itself: where noise and a quiet model share a band, how
+    they beat is told to some ten decibels only.
     """
     return tuple(
         each
