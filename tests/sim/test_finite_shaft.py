@@ -163,6 +163,19 @@ def test_the_gearbox_has_58_coordinates_and_turns_freely(finite, lumped):
         assert ratio == pytest.approx(1.0, rel=1e-9), shaft
 
 
+def test_the_weight_is_that_of_shafts_wheels_couplings_and_rings(finite, lumped, shafts):
+    total = 0.0
+    for wheel, own in zip(lumped.wheels, (shafts.input, shafts.output), strict=True):
+        length = own.coupling_overhang_m + own.near_span_m + own.far_span_m + own.encoder_overhang_m
+        total += math.pi / 4 * shafts.diameter_m**2 * length * shafts.density_kg_per_m3
+        total += wheel_disc(wheel, shafts).mass_kg + own.coupling_mass_kg + 2 * shafts.ring_mass_kg
+    # Coordinates have unit mass: what gravity pulls at is the motion of all by 1 m.
+    weight = finite.system.inputs[:, 2]
+    assert weight @ weight == pytest.approx(total, rel=1e-6)
+    inside = [finite.system.dof_names[i] for i in np.flatnonzero(weight)]
+    assert all(name.startswith("y_") for name in inside)
+
+
 def test_what_is_missing_or_too_much_is_said(params, shafts):
     model = params.model
     for change, field in (
