@@ -20,11 +20,6 @@ NU = 5.0
 """Degrees of freedom of Student's t: heavier tails than any domain showed on replicates."""
 RATIO_DB = 6.0
 """A line off its place by the width at which lines part counts as much as one too weak by half."""
-# Degrees of freedom by which a single place is told: with those of the density a line would need twelve
-# standard deviations. On replicates nothing is told either way (test_replicates).
-# Degrees of freedom by which a single place is told: with those of the density a line would need twelve
-# standard deviations. On replicates nothing is told either way.
-_NU_TOLD = 8.0
 _DEFAULT_TAU_DB = 1.0
 _T_CONST = math.lgamma((NU + 1) / 2) - math.lgamma(NU / 2) - 0.5 * math.log(NU * math.pi)
 
@@ -158,8 +153,10 @@ def pooled(comparisons: Sequence[Comparison]) -> Comparison:
     return _comparison(comparisons[0].places, difference, z, std, some, speed)
 
 
-def significant(comparison: Comparison, false_share: float = 0.01) -> NDArray[np.bool_]:
+def significant(comparison: Comparison, false_share: float = 0.01, nu: float = NU) -> NDArray[np.bool_]:
     """Places that differ for certain: of those told at most `false_share` do so by chance, on average.
+
+    `nu` are the degrees of freedom of differences in standard deviations.
 
     Benjamini and Hochberg, J. R. Stat. Soc. B 57 (1995) 289-300, over all counted places, with the tails of
     Student's t; valid for positively dependent places, as neighbours are.
@@ -172,6 +169,6 @@ def significant(comparison: Comparison, false_share: float = 0.01) -> NDArray[np
     index = np.flatnonzero(comparison.counted)
     if index.size == 0:
         return out
-    p = 2 * stats.t.sf(np.abs(comparison.z[index]), _NU_TOLD)
+    p = 2 * stats.t.sf(np.abs(comparison.z[index]), nu)
     out[index] = stats.false_discovery_control(p, method="bh") <= false_share
     return out
