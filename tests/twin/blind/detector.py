@@ -1,7 +1,8 @@
 """The baseline of everyday practice: levels in third-octave bands and the crest, against the nominal model.
 
-It says whether something differs, and nothing more. The threshold of a rig is 1.2 dB over the largest difference
-that was found on ten machines without effects (four, three and three of the rigs, seeds 990100 and following).
+It says whether something differs, and nothing more. The threshold of a rig is 1.2 dB over the largest
+difference that was found on ten machines without effects (four, three and three of the rigs, seeds 990100
+and following).
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from blind.detector import THRESHOLD_DB, largest_db
+from blind.detector import largest_db
 from blind.judging import judge
 from blind.making import hidden, make, write
 from blind.plan import Planned, planned
@@ -41,8 +41,7 @@ def run(seed: int, index: int, workers: int, cache: Path | None, limit_s: float)
             return {**result, "failed": judged.said}
         result["score"] = score(truth, plan.kind, judged.verdict)
         result["verdict"] = judged.verdict
-        largest = largest_db(places, RIGS[plan.rig])
-        result["detector"] = {"largest_db": largest, "alarm": largest > THRESHOLD_DB[plan.rig]}
+        result["detector"] = {"largest_db": largest_db(places, RIGS[plan.rig])}
     return result
 
 
