@@ -110,7 +110,10 @@ BAD = [
     ("speed: 10 Hz", "got speed, expected one of the keys batch_samples, description, faults, "),
     ("model: lpm99", "model: got lpm99, expected one of bearing2, "),
     ("seed: -1", "seed: got -1, expected "),
-    ("sample_rate: 65536", "sample_rate: got 65536, expected a number in Hz, >= 1000 and <= 2000000 (the unit"),
+    (
+        "sample_rate: 65536",
+        "sample_rate: got 65536, expected a number in Hz, >= 1000 and <= 2000000 (the unit",
+    ),
     ("sample_rate: 65536 m", "(not m)"),
     ("sample_rate: 10 Hz", "sample_rate: got 10 Hz, expected a number in Hz, >= 1000"),
     ("sample_rate: .nan", "sample_rate: got nan"),
