@@ -92,6 +92,7 @@ def _goals(results: Sequence[Result]) -> str:
         ("outside the library: says that it does not know all", share(outside, right("strict")), ""),
         ("- and tells the frequency", share(outside, right("lenient")), "90 %"),
         ("two effects: both among the causes", share(pairs, right("strict")), "85 %"),
+        ("- or told as what could stand in another's place", share(pairs, right("lenient")), ""),
         ("95 % intervals of parameters that hold the truth", all_of_them, "90 to 98 %"),
         (
             "any case: a cause named that is not hidden",
