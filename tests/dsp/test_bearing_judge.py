@@ -207,6 +207,20 @@ def test_of_families_within_each_others_tolerance_that_with_the_likelier_slip_is
         assert finding.fault == fault
 
 
+@pytest.mark.parametrize("fault", ["outer_race", "rolling_element"])
+def test_of_a_race_and_an_element_with_one_rate_the_swing_with_the_cage_decides(fault):
+    """Of eleven elements with 2/9 of the pitch diameter both strike 4.278 times a turn."""
+    bearing = Bearing("alike", "shaft", 11, 40e-3 * (2 / 9 - 2e-5), 40e-3, 0.0, False, ("ch_1",))
+    plate = replace(machine(tacho=True), bearings=(bearing,))
+    orders = {f.fault: f.order for f in fault_families(plate)}
+    assert orders["rolling_element"] == pytest.approx(orders["outer_race"], rel=3e-4)
+    for seed in range(3):
+        carrier = orders["cage"] if fault == "rolling_element" else 0.0
+        made = _made(seed, orders["rolling_element"], 0.6, carrier, slip=0.002)
+        (finding,) = verdict_of(made.x[None], RATE, plate, made.tacho()).findings
+        assert finding.fault == fault
+
+
 def test_a_weak_family_is_noted_but_not_found():
     made = _made(7, BPFO, 0.17, seconds=20.0)
     verdict = verdict_of(made.x[None], RATE, machine(tacho=True), made.tacho())

@@ -7,11 +7,13 @@ from bearing_signals import Signal, defect, machine, noise, turns_of
 from pooling import verdict_of
 
 from gearsim_dsp.bands import Band
+from gearsim_dsp.diagnose import diagnose_record
 from gearsim_dsp.families import BandLevel, FamilyEvidence
 from gearsim_dsp.judges.companions import heard_at, is_companion
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import FaultFamily, bearing_orders
 from gearsim_io.nameplate import Bearing, Shaft
+from gearsim_io.record import PulseTrain, Record
 
 RATE = 16_000.0
 SPEED = 24.8
@@ -65,6 +67,29 @@ def test_a_second_fault_that_is_loudest_at_its_own_bearing_is_found():
             ("bearing_1", "inner_race"),
             ("bearing_2", "outer_race"),
         }
+
+
+def test_a_weak_second_family_is_noted_beside_a_finding_and_traces_of_that_are_not():
+    plate = _plate(3.93)
+    rng = np.random.default_rng(2)
+    turns = turns_of(SPEED, 12.0, RATE)
+    first = defect(rng, turns, RATE, BPFI, carrier_order=1.0).x
+    second = defect(rng, turns, RATE, 3.93, resonance_hz=5500.0, slip=0.002).x
+    for share, noted in ((0.2, True), (0.0, False)):
+        data = np.stack(
+            [noise(rng, turns.size) + first, noise(rng, turns.size) + 0.1 * first + share * second]
+        )
+        verdict = verdict_of(data, RATE, plate, Signal(first, RATE, turns).tacho())
+        assert [(f.component, f.fault) for f in verdict.findings] == [("bearing_1", "inner_race")]
+        weak = [note.detail for note in verdict.notes if note.issue == "weak_modulation"]
+        assert any("BPFO of bearing_2" in one for one in weak) is noted
+        assert len(weak) == noted
+        if noted:
+            tacho = PulseTrain("shaft", 1.0, Signal(first, RATE, turns).tacho())
+            record = Record(RATE, ("ch_1", "ch_2"), "m/s^2", data.astype(np.float32), (tacho,))
+            told = diagnose_record(record, plate)
+            assert [f.component for f in told.findings] == ["bearing_1"]
+            assert any("BPFO of bearing_2" in note.detail for note in told.quality)
 
 
 def test_no_cage_is_blamed_for_the_beat_of_a_race_with_the_shaft():

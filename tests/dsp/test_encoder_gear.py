@@ -141,6 +141,17 @@ def test_a_shaft_that_shakes_all_round_is_no_fault_of_its_wheel():
     assert judge_gears(shaken) == ()
 
 
+@pytest.mark.parametrize(("order", "kept"), [(7.5009, False), (8.003, False), (7.4034, True), (7.75, True)])
+def test_what_strikes_at_halves_of_a_bad_tooths_turns_is_the_tooth(monkeypatch, order, kept):
+    """At a low load teeth part, and a bad one is met harder every other turn."""
+    tooth = Finding("gears", "gear_tooth_spall", 1.0, 1.0, SPEED_HZ, 20.0, 0.95, "moderate", "in_y")
+    monkeypatch.setattr("gearsim_dsp.judges.combine.judge_all", lambda _: (tooth,))
+    details = {"modulation": 0.4, "dominance": 4.0}
+    bearing = Finding("bearing_1", "inner_race", 7.54, order, 150.0, 12.0, 0.4, "moderate", "in_y", details)
+    found = all_findings(box_of(trains(1)), (bearing,))
+    assert ("inner_race" in [one.fault for one in found]) is kept
+
+
 @pytest.mark.parametrize(("confidence", "wear"), [(0.9, False), (0.35, False), (0.2, True)])
 def test_beside_a_bearing_that_is_told_nothing_is_said_of_wear(confidence, wear):
     bearing = Finding("bearing_1", "inner_race", 5.4, 5.4, 108.0, 20.0, confidence, "moderate", "in_y")

@@ -91,6 +91,28 @@ def test_wheels_of_nearly_one_speed_add_up_where_the_record_does_not_part_them(s
     assert "gear_eccentricity" not in [f.fault for f in judge_gears(box)]
 
 
+@pytest.mark.parametrize(("pinion", "gear"), [(19, 57), (20, 57)])
+def test_a_tooth_that_strikes_six_times_in_the_record_is_named_and_such_few_turns_are_not_wear(pinion, gear):
+    """Of 19 and 57 teeth the one of the gear always meets the same of the pinion, and is not that one's."""
+    machine, seconds = gearbox(pinion, gear), 6.4 * gear / pinion / SPEED_HZ
+    ratio = machine.shaft("output").ratio
+    rng = np.random.default_rng(4)
+    angle = turns(SPEED_HZ, seconds)
+    uneven = 1 + 0.02 * rng.standard_normal(gear)
+    sound = mesh(angle, pinion) * uneven[(angle * pinion).astype(int) % gear]
+    strikes = ring_down((np.arange(300) + 0.37) / (SPEED_HZ * ratio), seconds, 2.0, 1200.0)
+    for added, expected in ((0.0, []), (strikes, ["gears.gear"])):
+        channels = {n: sound + added + 0.2 * rng.standard_normal(angle.size) for n in ("in_y", "out_y")}
+        found = judge_gears(measured(machine, channels, steady(SPEED_HZ, seconds)))
+        assert [one.component for one in found] == expected
+    rough = 1 + 0.4 * rng.standard_normal(gear)
+    worn = mesh(angle, pinion, (3.0, 1.5, 2.0, 1.0)) * rough[(angle * pinion).astype(int) % gear]
+    few = shaft_signs(measured(machine, {"in_y": worn}, steady(SPEED_HZ, seconds)), ratio)
+    assert [one.turns for one in few] == [6]
+    found = judge_gears(measured(machine, {"in_y": worn}, steady(SPEED_HZ, seconds)))
+    assert "gears.gear" not in [one.component for one in found if one.fault == "gear_wear"]
+
+
 def test_nothing_is_judged_without_the_angle_or_with_few_turns():
     machine = gearbox()
     channels = {name: x[: 16384 // 4] for name, x in signals(1, machine, tooth_of="input").items()}

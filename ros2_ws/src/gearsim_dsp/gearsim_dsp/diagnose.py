@@ -221,7 +221,8 @@ def diagnose_record(record: Record, machine: Machine, settings: DiagnosisSetting
         strange = find_strange_comb(plate, pool, (supply, 60.0))
         findings = (strange,) if strange else ()
     notes += record_remarks(record, measured)
-    quality = (*angle.issues, *notes, *electrical, *(() if findings else _unexplained(verdict, impulsive)))
+    impacts = () if findings else _impacts(impulsive)  # which a finding would explain
+    quality = (*angle.issues, *notes, *electrical, *verdict.notes, *impacts)
     return Diagnosis(
         told,
         tuple(dict.fromkeys(quality)),
@@ -321,10 +322,6 @@ def _electrical_notes(
         if np.all(np.isfinite(record.data[row])):
             issues += _line_notes(_electrical(record, row, machine, verdict, findings), channel)
     return issues
-
-
-def _unexplained(verdict: Verdict, impulsive: list[Report]) -> tuple[QualityIssue, ...]:
-    return (*verdict.notes, *_impacts(impulsive))
 
 
 def _merged(reports: list[Report]) -> list[QualityIssue]:

@@ -28,9 +28,9 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     Notes
     -----
     Strong impacts of one tooth, once a turn, fill the envelope with the shaft's lines; what a bearing is then
-    said to have at a multiple of that speed is the tooth. A bad tooth also raises the unevenness by which
-    wear is judged; the gear judge sees to that itself. So do the impacts of a bearing: beside one that is
-    told nothing is said of wear.
+    said to have at a multiple of that speed, or of half of it, is the tooth. A bad tooth also raises the
+    unevenness by which wear is judged; the gear judge sees to that itself. So do the impacts of a bearing:
+    beside one that is told nothing is said of wear.
     """
     others = judge_all(measured)
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
@@ -64,7 +64,8 @@ def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bo
 
 
 def _is_multiple(bearing: Finding, tooth: Finding) -> bool:
-    number = round(bearing.found_order / tooth.found_order)
+    """Of the tooth's rate or of half of it: teeth that part at a low load meet harder every other turn."""
+    number = round(2.0 * bearing.found_order / tooth.found_order) / 2.0
     return (
         number >= 1 and abs(bearing.found_order / (number * tooth.found_order) - 1.0) < _SAME_ORDER / number
     )

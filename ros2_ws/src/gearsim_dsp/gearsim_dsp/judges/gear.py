@@ -45,13 +45,14 @@ _TOOTH_OVER_DOUBT = 6.0
 _WEAR_SPREAD = 0.06
 _WEAR_HARMONICS = 0.35
 _WEAR_MEAN, _WEAR_EACH = 1.2, 0.75  # sound gearboxes reach means of 1.12
+_WEAR_TURNS = 10  # fewer leave too much of the mate's teeth in the average
 _RUNOUT_OF_PITCH = 0.0075
 _HIDDEN_MM_S = 0.8  # of unbalance in the noise, which would look like run-out
 _SEVERE_TOOTH, _MODERATE_TOOTH = 300.0, 30.0
 
 
 def judge_gears(measured: Measured) -> tuple[Finding, ...]:
-    """Findings on the wheels of all meshes; none without the angle or with fewer than ten turns."""
+    """Findings on the wheels of all meshes; none without the angle or with fewer than five turns."""
     if measured.phase is None:
         return ()
     machine = measured.machine
@@ -162,7 +163,8 @@ def _wear(measured: Measured, signs: list[ShaftSigns]) -> list[Finding]:
     """Both signs together: uneven teeth all round, and mesh harmonics that sound teeth do not have."""
     if measured.speed.source not in ("tacho", "encoder"):
         return []  # an angle read from the vibration smears the average, which looks like uneven teeth
-    worst = max((one for one in signs if one.mesh_is_heard), key=_wear_size, default=None)
+    averaged = [one for one in signs if one.turns >= _WEAR_TURNS]
+    worst = max((one for one in averaged if one.mesh_is_heard), key=_wear_size, default=None)
     if worst is None or _wear_size(worst) < 1.0:
         return []
     component, _ = wheel_name(measured, worst.ratio, worst.teeth)
