@@ -16,6 +16,13 @@ def test_every_fault_has_a_confidence_between_the_bounds(fault):
         assert LEAST <= confidence(fault, {"modulation": size, "over_rest": size, "level": size}) <= MOST
 
 
+@pytest.mark.parametrize("fault", ["outer_race", "inner_race"])
+def test_the_same_numbers_say_more_over_a_shafts_lines_than_over_a_floor(fault):
+    """Of 23 such findings with a mean confidence of 0.84 without that number 22 were right."""
+    numbers = {"modulation": 1.81, "dominance": 0.81, "share": 3.0, "improbable": 1.44, "harmonics": 1.75}
+    assert confidence(fault, {**numbers, "covered": 1.0}) > confidence(fault, numbers) + 0.1
+
+
 def test_weights_of_a_known_model_come_back():
     """Logistic data with weights 1.5 and -1: standard errors with 4,000 cases are below 0.07."""
     rng = np.random.default_rng(1)

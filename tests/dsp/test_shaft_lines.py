@@ -68,6 +68,7 @@ def test_harmonics_that_are_parted_prove_a_race_whose_first_ones_are_not():
         ).findings
         assert finding.fault == "inner_race"
         assert finding.evidence["covered_by"] == "6 x shaft"
+        assert finding.evidence["features"]["covered"] == 1.0
         assert finding.evidence["dominance"] > 20.0
 
 

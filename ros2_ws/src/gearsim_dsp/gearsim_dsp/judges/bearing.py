@@ -243,6 +243,8 @@ def _finding(
         "improbable": min(-math.log10(max(evidence.false_alarm_probability, 1e-30)), 30.0) / 10.0,
         "harmonics": float(sum(level >= 6.0 for level in evidence.harmonic_snr_db)) / 4.0,
         "beside": _beside(evidence, before),
+        # Over a few other lines of a shaft nothing gets as improbable or as dominant as over a floor.
+        "covered": float(evidence.covered_by is not None),
     }
     details: dict[str, object] = {
         "channel": evidence.channel,
