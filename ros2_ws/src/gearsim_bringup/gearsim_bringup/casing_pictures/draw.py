@@ -22,7 +22,7 @@ from gearsim_sim.model.casing.structure import MeshedStructure
 COLUMNS = 4
 # Largest displacement drawn, over the casing's longest side.
 STRETCH = 0.07
-_VIEWS = (View(azimuth_deg=30, elevation_deg=32), View(azimuth_deg=145, elevation_deg=32))
+VIEWS = (View(azimuth_deg=30, elevation_deg=32), View(azimuth_deg=145, elevation_deg=32))
 _RING = "#8d8d8d"
 _GROUPS = (
     ("plates", "#c9d7e8"),
@@ -37,8 +37,8 @@ def draw_mesh(mesh: Mesh, path: Path) -> None:
     figure = Figure(figsize=(13, 6.2), layout="constrained")
     faces, regions = outside(mesh)
     colours = np.array([to_rgb(_colour(mesh, region)) for region in regions.tolist()])
-    for axes, view in zip(figure.subplots(1, 2), _VIEWS, strict=True):
-        _paint(axes, view, mesh.nodes_m, faces, colours, line_width=0.2)
+    for axes, view in zip(figure.subplots(1, 2), VIEWS, strict=True):
+        paint(axes, view, mesh.nodes_m, faces, colours, line_width=0.2)
         places = view.project(mesh.nodes_m[list(mesh.masters.values())])
         # Those of the wall in front alone: names of the others would stand on the wrong wall.
         for name, (across, up, near) in zip(mesh.masters, places.tolist(), strict=True):
@@ -75,7 +75,7 @@ def draw_modes(structure: MeshedStructure, frequencies_hz: Array, shapes: Array,
         size = np.linalg.norm(moved, axis=1)[faces].mean(axis=1)
         colours = colormaps["viridis"](size / size.max())[:, :3]
         stretched = nodes + moved * (STRETCH * longest / size.max())
-        _paint(axes, _VIEWS[0], stretched, faces, colours, line_width=0.0)
+        paint(axes, VIEWS[0], stretched, faces, colours, line_width=0.0)
         axes.set_title(f"{k + 1}: {frequencies_hz[k]:.0f} Hz", fontsize=10)
     figure.savefig(path, dpi=90, metadata={"Software": None})
 
@@ -88,7 +88,7 @@ def _colour(mesh: Mesh, region: int) -> str:
     return dict(_GROUPS)["strips along welds" if part.endswith("weld") else whole]
 
 
-def _paint(axes: Axes, view: View, nodes_m: Array, faces: Cells, colours: Array, line_width: float) -> None:
+def paint(axes: Axes, view: View, nodes_m: Array, faces: Cells, colours: Array, line_width: float) -> None:
     """Faces from the farthest to the nearest, those turned away from the light darker."""
     seen = view.project(nodes_m)
     order = np.argsort(seen[faces][:, :, 2].mean(axis=1))

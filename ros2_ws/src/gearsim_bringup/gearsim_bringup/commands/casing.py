@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,7 @@ GROUP_EXAMPLE = """
 ./gearsim casing check
 ./gearsim casing reduce --out out/casing.npz
 ./gearsim casing show --out out/casing
+./gearsim casing update --out out/updated
 """
 BUILD_EXAMPLE = """
 ./gearsim casing build --out out/matrices
@@ -34,7 +35,7 @@ REDUCE_EXAMPLE = """
 
 @click.group("casing", epilog=example(GROUP_EXAMPLE))
 def command() -> None:
-    """Build, check, reduce and show finite-element models of a gearbox's casing.
+    """Build, check, update, reduce and show finite-element models of a gearbox's casing.
 
     CASING is a shipped name or the path of a description (.yaml), see docs/casing.md.
     """
@@ -168,3 +169,36 @@ def show(casing: str, out: Path, modes: int, mounted: bool, json_mode: bool) -> 
     for file in files:
         voice.say(f"  {file}")
     voice.result({"files": [str(file) for file in files], "frequencies_hz": frequencies})
+
+
+@command.command("update", epilog=example("./gearsim casing update --out out/updated"))
+@click.argument("casing", default=DEFAULT)
+@click.option("--out", required=True, type=ANY_PATH, help="Folder for description, table and pictures.")
+@click.option("--steps", default=12, show_default=True, type=click.IntRange(1, 50), help="At most so many.")
+@click.option("--mirrored", is_flag=True, help="Mirror images of a strip change alike.")
+@json_option
+def update(casing: str, out: Path, steps: int, mirrored: bool, json_mode: bool) -> None:
+    """Update CASING's plate thickness by regions to the modal test of the thesis (Table 3.1)."""
+    from gearsim_bringup.casing_pictures.update_page import make_folder, write_update
+    from gearsim_sim.model.casing.against_thesis import BASIS, update_to_thesis
+    from gearsim_sim.model.casing.params import load_casing
+
+    voice = Voice(json_mode=json_mode)
+    params = load_casing(casing)
+    make_folder(out)
+    with voice.progress() as bar:
+        task = bar.add_task("mesh", total=None)
+        tell = lambda step: bar.update(task, description=step)  # noqa: E731
+        found = update_to_thesis(params, steps, mirrored=mirrored, tell=tell)
+        files = write_update(casing, found, BASIS, out, tell)
+    content: dict[str, Any] = {"name": params.name, "steps": found.steps}
+    for name, after in (("before", False), ("after", True)):
+        off = 100 * abs(found.deviations(after=after))
+        content[name] = {"mean_percent": float(off.mean()), "worst_percent": float(off.max())}
+        voice.say(
+            f"{name + ':':8}frequencies off by {off.mean():.2f} % in the mean, {off.max():.2f} % at worst"
+        )
+    for file in files:
+        voice.say(f"  {file}")
+    changes = dict(zip(found.regions, found.change.tolist(), strict=True))
+    voice.result({**content, "change": changes, "files": [str(file) for file in files]})
