@@ -44,6 +44,19 @@ def test_update_leaves_description_table_and_pictures(coarse, tmp_path, capsys):
     assert load_casing(str(out / "updated.yaml")).name == "coarse_updated"
 
 
+def test_a_virtual_hammer_test_is_struck_identified_and_updated_to(coarse, tmp_path, capsys):
+    out = tmp_path / "hammer"
+    assert (
+        main(["casing", "update", coarse, "--hammer", "4", "--steps", "4", "--out", str(out), "--json"]) == 0
+    )
+    told = json.loads(capsys.readouterr().out)
+    assert told["after"]["mean_percent"] < 0.5 * told["before"]["mean_percent"]
+    assert set(told["true_change"]) == set(told["change"])
+    names = {file.name for file in out.iterdir()}
+    assert {"mac.png", "responses.png", "updated.yaml"} <= names
+    assert {Path(file).name for file in told["files"]} == names
+
+
 def test_a_file_in_the_way_is_told_in_one_line(coarse, tmp_path, capsys):
     out = tmp_path / "taken"
     out.write_text("")

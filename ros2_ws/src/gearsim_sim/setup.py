@@ -44,8 +44,8 @@ setup(
         "ruamel.yaml>=0.18",
         f"gearsim_io=={VERSION}",
     ],
-    # What reads Nastran's matrices of a casing of one's own.
-    extras_require={"nastran": ["pyyeti>=1.4.7"]},
+    # What reads Nastran's matrices of a casing of one's own; what finds the modes of its modal test.
+    extras_require={"nastran": ["pyyeti>=1.4.7"], "modal_test": ["sdypy-EMA>=0.31"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -6,11 +6,12 @@ import csv
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from gearsim_bringup.casing_pictures.draw import draw_modes
+from gearsim_bringup.casing_pictures.modal_test import draw_macs, draw_responses
 from gearsim_bringup.casing_pictures.updating import draw_deviations, draw_thickness
 from gearsim_io.errors import InputError
+from gearsim_sim.model.casing.from_test import TestedUpdate
+from gearsim_sim.model.casing.modal_test import ModalTest
 from gearsim_sim.model.casing.updated_file import (
     description_path,
     updated_description,
@@ -45,17 +46,25 @@ def write_update(
     return files
 
 
-def table(update: Update) -> list[tuple[float, ...]]:
-    """One row for each measured frequency, as `HEADER` says; modes are counted from 1."""
-    first, last = update.first_pairs, update.last_pairs
-    before, after = (100 * update.deviations(after=late) for late in (False, True))
-    columns = (
-        last.measured_hz,
-        first.modes + 1,
-        np.round(update.before.frequencies_hz[first.modes], 2),
-        np.round(before, 2),
-        last.modes + 1,
-        np.round(update.after.frequencies_hz[last.modes], 2),
-        np.round(after, 2),
-    )
-    return list(zip(*(column.tolist() for column in columns), strict=True))
+def write_test(tested: TestedUpdate, test: ModalTest, out: Path) -> list[Path]:
+    """Pictures of the test beside those of the updating; their paths."""
+    files = [out / "mac.png", out / "responses.png"]
+    draw_macs(tested, files[0])
+    draw_responses(tested, test, files[1])
+    return files
+
+
+def table(update: Update) -> list[tuple[float | str, ...]]:
+    """One row for each measured frequency, as `HEADER` says; modes from 1, blanks where there is no pair."""
+    sides = []
+    for after in (False, True):
+        model, pairs = (update.after, update.last_pairs) if after else (update.before, update.first_pairs)
+        found = {}
+        rows = zip(pairs.measured_hz, pairs.modes, update.deviations(after=after), strict=True)
+        for hz, mode, off in rows:
+            own = round(float(model.frequencies_hz[mode]), 2)
+            found[float(hz)] = (int(mode) + 1, own, round(100 * float(off), 2))
+        sides.append(found)
+    measured = sorted({*sides[0], *sides[1]})
+    none = ("", "", "")
+    return [(round(hz, 3), *sides[0].get(hz, none), *sides[1].get(hz, none)) for hz in measured]

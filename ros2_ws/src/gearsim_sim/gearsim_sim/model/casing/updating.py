@@ -35,9 +35,11 @@ FIELD_BOUND = 0.1
 WELD_STD = 0.25
 FIELD_STD = 0.03
 # Of a measured frequency, relative: what a thickness by strips can be asked to explain of a real casing.
-FREQUENCY_STD = 0.005
+FREQUENCY_STD = 0.003
 SETTLED = 2e-3
-ASYMMETRY = 0.01
+ASYMMETRY = 0.05
+# A measured mode without a pair costs as much as one off by so many standard deviations.
+MISSED = 10.0
 RIGID = 6
 SPARE = 8
 
@@ -69,6 +71,8 @@ class Match:
     """Index of the model's elastic mode beside each measured frequency, from 0."""
     mac: Array | None = None
     """Of each pair, where shapes were measured."""
+    missed: int = 0
+    """Measured modes to which none of the model's answers."""
 
 
 Pairing = Callable[[FreeModel], Match]
@@ -198,7 +202,7 @@ def update_thickness(
     tell : callable
         Hears of each step.
     """
-    mesh = _hung_up(params)
+    mesh = hung_up(params)
     first = thicknesses_m(params, mesh.regions)
     prior = prior_of(mesh.regions)
     tell("modes before")
@@ -211,6 +215,7 @@ def update_thickness(
         slopes, gap = _linearised(params, model, pairs, first)
         slopes = slopes @ prior.spread
         cost = float(np.sum((gap / frequency_std) ** 2) + np.sum((moved / prior.std) ** 2))
+        cost += pairs.missed * MISSED**2
         if best is None or cost < best.cost:
             best = _Point(cost, moved, model, pairs, slopes)
         new = _best_step(slopes, gap, moved, prior, frequency_std)
@@ -224,7 +229,8 @@ def update_thickness(
     return Update(mesh.regions, change, std, before, best.model, pairing(before), best.pairs, step)
 
 
-def _hung_up(params: CasingParams) -> Mesh:
+def hung_up(params: CasingParams) -> Mesh:
+    """The mesh of a casing without its pads."""
     return dataclasses.replace(casing_mesh(params), pads=())
 
 
