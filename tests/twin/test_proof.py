@@ -7,12 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gearsim_twin.causes import CAUSES
 from gearsim_twin.causes.cause import Parameter
 from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.causes.speed_fluctuation import course_of
 from gearsim_twin.chain_doubts import chain_doubts
 from gearsim_twin.model import Extension
 from gearsim_twin.proof import REPEATED_NATS, proof_nats, with_proofs
 from gearsim_twin.stack import Assumed
+from tests.twin.chain_cases import context, healthy, record
 
 
 class Hum:
@@ -61,6 +64,24 @@ def test_held_out_records_are_looked_at_only_where_somebody_asks():
 
     assert with_proofs([read(proven=False)], never) == [0.0]
     assert with_proofs([read(proven=False), read()], lambda: [1.0])[1] > 0.0
+
+
+def test_a_swing_of_the_speed_is_proven_by_another_record():
+    cause = CAUSES["speed_fluctuation"]
+
+    def shown(part, seed):
+        time_s = np.arange(0.0, 5.0, 0.04)
+        speed_hz = 24.8 * (1 + part * course_of(time_s, 3.0, seed))
+        columns = {"time_s": time_s.tolist(), "speed_hz": speed_hz.tolist()}
+        point = {"speed": None, "load": "0 N*m"}
+        measured = record("bearing", seed, profile={"trace": {"columns": columns}}, operating_point=point)
+        return context("bearing", measured)
+
+    (start,) = cause.starts(shown(0.01, 5))
+    found = Extension(cause, start, None)
+    assert proof_nats(found, shown(0.01, 6)) > REPEATED_NATS
+    assert proof_nats(found, shown(0.001, 6)) == 0.0
+    assert proof_nats(found, healthy("bearing", 3)) == 0.0
 
 
 def bench(std_db):

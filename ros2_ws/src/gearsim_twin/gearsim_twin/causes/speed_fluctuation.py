@@ -96,6 +96,7 @@ class SpeedFluctuation:
     """Random swings of the speed about its mean."""
 
     name = "speed_fluctuation"
+    proven = True  # read off the marks of the shaft; few places have a level that tells of it
     parameters: tuple[Parameter, ...] = (
         Parameter("rms_relative", "1", LogNormal(3e-3, 4.0, 1e-6, _LARGEST)),
         Parameter("bandwidth_hz", "Hz", LogNormal(1.0, 3.0, *_BAND_HZ)),
