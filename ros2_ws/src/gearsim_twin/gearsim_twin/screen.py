@@ -25,6 +25,9 @@ _AT_ONCE = 8
 # A guess that did so much worse than nothing is not tried again in the next round.
 _NO_USE_NATS = 5.0
 _STRENGTHS = 2.0 ** np.arange(-5, 6)
+# Of a guess that would do better at less strength, the size is sought: events of a size that is much too
+# great are of another shape, and no scaling of what they add makes them those of a small one.
+_SMALLER = (-0.7, -1.4, -2.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,12 +43,18 @@ class Screened:
         How many guesses that cause had.
     proof_nats : float
         What finding it again in held-out records adds.
+    plain_nats : float
+        As `nats`, at the strength of the guess itself.
+    strength : float
+        The best strength, of the guess's own.
     """
 
     trial: Trial
     nats: float
     guesses: int
     proof_nats: float = 0.0
+    plain_nats: float = 0.0
+    strength: float = 1.0
 
     @property
     def extension(self) -> Extension:
@@ -93,28 +102,65 @@ def screen(
 
     They are simulated some at a time, until `enough` says that no further one may be.
     """
-    before = yard.value(base.trial.levels, base.at)
+    before = _adapted_value(yard, base)
     best: dict[tuple[str, str], Screened] = {}
     for start in range(0, len(guesses), _AT_ONCE):
         if enough():
             break
-        some = guesses[start : start + _AT_ONCE]
-        trials = bench.trials([base.trial.model.extended(extension) for extension, _ in some])
-        for trial, (extension, count) in zip(trials, some, strict=True):
-            value = -np.inf if trial.refused else _best_value(yard, base, trial)
-            found = Screened(trial, float(value) - before - extension.reading_nats, count)
-            known = best.get(extension.key)
+        for found in _screened(bench, yard, base, guesses[start : start + _AT_ONCE], before):
+            known = best.get(found.extension.key)
             if known is None or known.nats < found.nats:
-                best[extension.key] = found
+                best[found.extension.key] = found
+    if not enough():
+        for found in _screened(bench, yard, base, _smaller(list(best.values())), before):
+            known = best[found.extension.key]
+            if known.plain_nats < found.plain_nats:
+                best[found.extension.key] = replace(found, nats=max(found.nats, known.nats))
     return sorted(best.values(), key=lambda each: -each.nats)
 
 
-def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
-    """Log probability of the guess as simulated, or at a strength that does better, all else adapting."""
+def _adapted_value(yard: Yardstick, base: Fitted) -> float:
+    """Log probability of the base, which adapts as it may beside each guess."""
+    levels = base.trial.levels
+    adapted = yard.adapted(levels, base.slopes, base.at, base.posterior.noise)
+    return max(yard.value(levels, base.at), yard.value(*adapted))
+
+
+def _screened(
+    bench: Workbench, yard: Yardstick, base: Fitted, guesses: list[tuple[Extension, int]], before: float
+) -> list[Screened]:
+    """Some guesses beside the log likelihood without."""
+    trials = bench.trials([base.trial.model.extended(extension) for extension, _ in guesses])
+    found = []
+    for trial, (extension, count) in zip(trials, guesses, strict=True):
+        plain, value, strength = (-np.inf, -np.inf, 1.0) if trial.refused else _values(yard, base, trial)
+        price = before + extension.reading_nats
+        found.append(Screened(trial, value - price, count, plain_nats=plain - price, strength=strength))
+    return found
+
+
+def _smaller(screened: list[Screened]) -> list[tuple[Extension, int]]:
+    """Smaller sizes of the guesses that show too much."""
+    found = []
+    for each in screened:
+        names = [parameter.name for parameter in each.extension.free]
+        size = getattr(each.extension.cause, "size", "")
+        if each.strength < 1.0 and size in names:
+            k = names.index(size)
+            for step in _SMALLER:
+                at = list(each.extension.coordinates)
+                at[k] += step
+                found.append((each.extension.at(tuple(at)), each.guesses))
+    return found
+
+
+def _values(yard: Yardstick, base: Fitted, trial: Trial) -> tuple[float, float, float]:
+    """Log probability as simulated and at the best strength, all else adapting; that strength."""
     noise = base.posterior.noise
-    candidates = [trial.levels]
+    candidates, strengths = [trial.levels], [1.0]
     below, above = _power(base.trial.levels.level_db), _power(trial.levels.level_db)
     if trial.model.extensions[-1].free:
+        strengths += _STRENGTHS.tolist()
         for strength in _STRENGTHS:
             power = np.maximum(below + strength * (above - below), 1e-3 * np.minimum(below, above))
             level = np.where(yard.is_assumed, trial.levels.level_db, 10.0 * np.log10(power))
@@ -124,7 +170,9 @@ def _best_value(yard: Yardstick, base: Fitted, trial: Trial) -> float:
         float(yard.loglike(yard.residual(levels), yard.variance(levels), noise).sum()) - 0.5 * float(at @ at)
         for levels, at in adapted
     ]
-    return yard.value(*adapted[int(np.argmax(values))])
+    best = int(np.argmax(values))
+    plain = yard.value(*adapted[0])
+    return plain, (yard.value(*adapted[best]) if best else plain), strengths[best]
 
 
 def _power(level_db: Array) -> Array:

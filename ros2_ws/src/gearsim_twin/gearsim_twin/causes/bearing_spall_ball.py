@@ -23,6 +23,7 @@ class BearingSpallBall:
 
     name = "bearing_spall_ball"
     parameters: tuple[Parameter, ...] = (SPALL_WIDTH,)
+    size = SPALL_WIDTH.name
     confused_with: tuple[tuple[str, str], ...] = (
         (
             "bearing_geometry",

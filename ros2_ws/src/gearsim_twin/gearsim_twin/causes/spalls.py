@@ -104,6 +104,7 @@ class RaceSpall:
     """
 
     parameters: tuple[Parameter, ...] = (SPALL_WIDTH,)
+    size = SPALL_WIDTH.name
 
     def __init__(self, name: str, fault: str, kind: str, confused_with: tuple[tuple[str, str], ...]) -> None:
         self.name = name

@@ -36,6 +36,7 @@ class WideSpall:
     """A pit of a race with entry edge, floor and exit edge."""
 
     name = "wide_spall"
+    size = "depth_m"
     parameters: tuple[Parameter, ...] = (
         Parameter("length_m", "m", LogNormal(4e-3, 2.0, 1e-3, 0.1)),
         Parameter("depth_m", "m", LogNormal(20e-6, 2.5, 1e-6, 5e-4)),
