@@ -28,6 +28,7 @@ from gearsim_twin.conclude import Evidence, concluded
 from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
 from gearsim_twin.fit import fit_tuning, judged
+from gearsim_twin.heard import heard
 from gearsim_twin.labels import speed_label
 from gearsim_twin.measuring_chain import measuring_chain
 from gearsim_twin.model import Model
@@ -160,6 +161,9 @@ class Bench:
         contents = {bench.numbers[k]: trial.model.content(bench.nominal[k]) for k in records}
         shown = [trial.features[k] for k in records]
         tau = prior.tau_of(bench.stack.domains)
+        plain = tuple(
+            _simulated(self.simulator, k, content, self.settings) for k, content in contents.items()
+        )
         return Context(
             case=self.case,
             views=tuple(self.views[k] for k in contents),
@@ -167,8 +171,9 @@ class Bench:
             simulated=tuple(shown),
             comparison=tuple(compare(bench.measured[k], trial.features[k], tau) for k in records),
             contents=tuple(contents.values()),
-            simulated_views=tuple(
-                _simulated(self.simulator, k, content, self.settings) for k, content in contents.items()
+            simulated_views=plain,
+            noisy_views=tuple(
+                heard(view, trial.nuisance[0], self.settings.seed + k) for k, view in enumerate(plain)
             ),
         )
 

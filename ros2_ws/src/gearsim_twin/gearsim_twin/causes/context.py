@@ -44,6 +44,8 @@ class Context:
         The present model under the conditions of each record.
     simulated_views : tuple of View
         What the present model gave.
+    noisy_views : tuple of View
+        The same with the noise of the sensors that the records tell; empty where that is not known.
     """
 
     case: Case
@@ -53,6 +55,7 @@ class Context:
     comparison: tuple[Comparison, ...]
     contents: tuple[Content, ...]
     simulated_views: tuple[View, ...]
+    noisy_views: tuple[View, ...] = ()
 
     def differences(
         self, domain: str, channel: str | None = None, kind: str | None = None

@@ -239,13 +239,16 @@ def by_channel(
     find: Callable[[Beside, float], CurveFit | None],
     floor: bool = False,
     per_octave: int = _PER_OCTAVE,
+    noisy: bool = False,
 ) -> dict[str, CurveFit]:
     """What `find` gives for each channel, of the record in which it lowers the misfit most.
 
-    `find` gets the spectra and the sample rate, and gives None where there is nothing.
+    `find` gets the spectra and the sample rate, and gives None where there is nothing. With `noisy` the model
+    has the sensors' noise.
     """
     found: dict[str, CurveFit] = {}
-    for view, model in zip(context.views, context.simulated_views, strict=True):
+    models = context.noisy_views if noisy else context.simulated_views
+    for view, model in zip(context.views, models, strict=True):
         for channel in view.record.channels:
             data = beside(view, model, channel, floor, per_octave)
             fit = None if data is None else find(data, view.record.sample_rate_hz)
