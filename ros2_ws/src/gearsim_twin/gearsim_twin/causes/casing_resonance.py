@@ -122,7 +122,7 @@ class CasingResonance:
         kept: list[tuple[str, CurveFit]] = []
         # Beside the sensors' noise first: without it all that lies between the lines is lifted.
         for noisy in (True, False) if context.noisy_views else (False,):
-            for name, fit in _clearest(context, noisy)[:_MOST_STARTS]:
+            for name, fit in _clearest(context, noisy):
                 if not any(name == site and _near(fit, other) for site, other in kept):
                     kept.append((name, fit))
         dips = by_channel(context, _dip, noisy=True) if context.noisy_views else {}
