@@ -114,7 +114,9 @@ def test_models_that_do_not_describe_the_machine(tmp_path):
     record = parallel_record()
     with pytest.raises(InputError, match=r"--model: got lpm43.*did you mean lpm34\?"):
         case_of("unsw_parallel", "lpm43", record)
-    with pytest.raises(InputError, match="a model that describes unsw_parallel: one of cb146, cb182, lpm22, lpm34"):
+    with pytest.raises(
+        InputError, match="a model that describes unsw_parallel: one of cb146, cb182, lpm22, lpm34"
+    ):
         case_of("unsw_parallel", "planetary18", record)
     with pytest.raises(InputError, match=r"section `model`.*docs/rigs.md; the machines .*mfpt.* have one"):
         case_of(str(without_model(tmp_path)), "lpm34", record)
