@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from gearsim_sim.integrate.coefficients import cubic_weights, padded
 from gearsim_sim.integrate.compiled import inlined
+from gearsim_sim.integrate.kernel import times_state
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -145,39 +146,6 @@ def pack_carrier_state(
 
 
 @inlined
-def row_products(
-    s: Array, k: Array, rows: int, count: int, length: int, stride: int, at: int, out: int
-) -> None:
-    """`count` rows of k (`stride` apart, from `rows` on) times s[at : at + length], into s[out:].
-
-    `length` is the stride once more, but no compile-time constant, see `kernel.times_state`.
-    """
-    n = length & 0xFFFF
-    blocks = (count & 0xFFFF) // 4
-    for b in range(blocks):
-        i = 4 * b
-        t0 = 0.0
-        t1 = 0.0
-        t2 = 0.0
-        t3 = 0.0
-        for m in range(n):
-            v = s[at + m]
-            t0 += k[rows + i * stride + m] * v
-            t1 += k[rows + (i + 1) * stride + m] * v
-            t2 += k[rows + (i + 2) * stride + m] * v
-            t3 += k[rows + (i + 3) * stride + m] * v
-        s[out + i] = t0
-        s[out + i + 1] = t1
-        s[out + i + 2] = t2
-        s[out + i + 3] = t3
-    for i in range(4 * blocks, count):
-        total = 0.0
-        for m in range(n):
-            total += k[rows + i * stride + m] * s[at + m]
-        s[out + i] = total
-
-
-@inlined
 def carrier_motion(s: Array, carrier: Carrier, q: Array, nc: int, ni: int) -> None:
     """Take the motion of the structure from that of the interfaces, q, with extrapolated forces."""
     k = carrier.k
@@ -280,7 +248,7 @@ def enter_forces(s: Array, k: Array, nc: int, ni: int) -> None:
 
 @inlined
 def carrier_advance(s: Array, carrier: Carrier, length: int, nc: int, ni: int) -> None:
-    """All modes a step on, under the forces on the structure; `length` is nc, see `row_products`."""
+    """All modes a step on, under the forces on the structure; `length` is nc, see `kernel.times_state`."""
     k = carrier.k
     ns = carrier.site_index.size & 0xFFFF
     now = _STATE_ROWS * nc
@@ -298,8 +266,8 @@ def carrier_advance(s: Array, carrier: Carrier, length: int, nc: int, ni: int) -
         s[3 * nc + m] = before
         s[5 * nc + m] = vi + k[4 * nc + m] * f + k[5 * nc + m] * before
         s[6 * nc + m] = k[6 * nc + m] * vr + k[7 * nc + m] * vi + k[8 * nc + m] * f + k[9 * nc + m] * before
-    row_products(s, k, _CONSTANT_ROWS * nc, ni, length, nc, 5 * nc, now + 3 * ni)
-    row_products(s, k, (_CONSTANT_ROWS + ni) * nc, ns, length, nc, 6 * nc, now + 16 * ni)
+    times_state(s, k, _CONSTANT_ROWS * nc, ni, length, nc, 5 * nc, now + 3 * ni)
+    times_state(s, k, (_CONSTANT_ROWS + ni) * nc, ns, length, nc, 6 * nc, now + 16 * ni)
 
 
 @inlined
