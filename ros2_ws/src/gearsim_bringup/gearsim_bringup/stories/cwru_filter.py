@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_bringup.method_figures.style import FAULTY, GREY, HEALTHY, mark, new_figure
-from gearsim_bringup.stories.views import view_at
+from gearsim_bringup.stories.views import learnt_and_held_out, view_at
 from gearsim_dsp.kurtogram import KurtogramNode, fast_kurtogram
 from gearsim_twin.causes.antialias_rolloff import edge_of_band, lowpass_db
 from gearsim_twin.causes.spectra_beside import Beside, beside
@@ -62,8 +62,7 @@ def tell(records: Measured) -> dict[str, Filtered]:
 
 
 def _filtered(view: View) -> Filtered:
-    end = 2 * view.record.sample_count // 3
-    first, last = (_beside_flat(view.part(*part)) for part in ((0, end), (end, view.record.sample_count)))
+    first, last = map(_beside_flat, learnt_and_held_out(view))
     rate = view.record.sample_rate_hz
     edge = edge_of_band(first, rate)
     assert edge is not None

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_bringup.method_figures.style import FAULTY, GREY, HEALTHY, new_figure
-from gearsim_bringup.stories.views import view_at
+from gearsim_bringup.stories.views import learnt_and_held_out, view_at
 from gearsim_dsp.kinematics import bearing_orders
 from gearsim_twin.causes.bearing_geometry import spin_of
 from gearsim_twin.causes.bearing_signs import signs_of
@@ -69,8 +69,7 @@ def tell(records: Measured) -> Race:
         If the record is in no data folder.
     """
     view = view_at(records, RECORD)
-    end = 2 * view.record.sample_count // 3
-    first, last = view.part(0, end), view.part(end, view.record.sample_count)
+    first, last = learnt_and_held_out(view)
     signs = [sign for sign in signs_of(first) if sign.component == _COMPONENT]
     outer = next(sign for sign in signs if sign.fault == "outer_race")
     motion = cage_motion(first, _COMPONENT)

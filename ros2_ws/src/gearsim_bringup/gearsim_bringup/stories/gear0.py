@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_bringup.method_figures.style import FAULTY, GREY, HEALTHY, mark, new_figure
-from gearsim_bringup.stories.views import view_at
+from gearsim_bringup.stories.views import learnt_and_held_out, view_at
 from gearsim_dsp.angle.resample import AngleSignal
 from gearsim_twin.view import View
 
@@ -69,8 +69,7 @@ def tell(records: Measured) -> Gear0:
         If the record is in no data folder.
     """
     view = view_at(records, RECORD)
-    end = 2 * view.record.sample_count // 3
-    first, last = (_turns(view.part(*part)) for part in ((0, end), (end, view.record.sample_count)))
+    first, last = map(_turns, learnt_and_held_out(view))
     return Gear0(view.speed_hz, _explained(first), _explained(last), _strange(first), _strange(last))
 
 

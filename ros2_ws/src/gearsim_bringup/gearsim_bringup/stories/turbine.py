@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_bringup.method_figures.style import FAULTY, GREY, HEALTHY, new_figure
-from gearsim_bringup.stories.views import view_at
+from gearsim_bringup.stories.views import learnt_and_held_out, view_at
 from gearsim_dsp.angle.resample import AngleSignal
 from gearsim_twin.view import View
 
@@ -70,8 +70,7 @@ def tell(records: Measured) -> Turbine:
         If the record is in no data folder.
     """
     view = view_at(records, RECORD)
-    end = 2 * view.record.sample_count // 3
-    first, last = view.part(0, end), view.part(end, view.record.sample_count)
+    first, last = learnt_and_held_out(view)
     time_s, speed_hz = view.speed_course(0.1)
     heights = [
         np.array([family_db(_orders(part), _PINION * _MESH / wheel) for wheel in _WHEELS])

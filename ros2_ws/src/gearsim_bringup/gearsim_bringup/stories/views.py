@@ -5,7 +5,7 @@ from __future__ import annotations
 from gearsim_bringup.method_figures.measured import Measured
 from gearsim_twin.view import View, view_of
 
-__all__ = ["view_at"]
+__all__ = ["learnt_and_held_out", "view_at"]
 
 
 def view_at(records: Measured, relative: str) -> View:
@@ -17,3 +17,9 @@ def view_at(records: Measured, relative: str) -> View:
         If no data folder has it.
     """
     return view_of(records.record(relative), records.machine(relative))
+
+
+def learnt_and_held_out(view: View) -> tuple[View, View]:
+    """The first two thirds of a record that is the only one, to learn from, and the last third."""
+    end = 2 * view.record.sample_count // 3
+    return view.part(0, end), view.part(end, view.record.sample_count)
