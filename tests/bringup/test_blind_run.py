@@ -58,6 +58,11 @@ def test_a_run_goes_on_where_another_ended(tmp_path: Path, log: Path) -> None:
     assert _asked(log) == [0, 1, 2]
     assert results[2]["words"] == ["--workers", "1", "--cache", "/kept"]
     assert read_results(out) == results
+    # A case of one rig only is another than that of the same number.
+    (other,) = run_blind([Job(1, 0, 1, rig="bearing")], out, 1)
+    assert other["words"] == ["--workers", "1", "--rig", "bearing"]
+    assert (out / "1-0-bearing.json").is_file()
+    assert len(read_results(out)) == 4
 
 
 def test_a_case_that_breaks_is_a_result_too(tmp_path: Path, log: Path) -> None:  # noqa: ARG001

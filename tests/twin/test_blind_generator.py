@@ -132,3 +132,16 @@ def test_plans_deal_all_causes_before_any_comes_again() -> None:
     pairs = [plan for plan in plans if plan.kind == "pair"]
     assert all(plan.effects[0][0] != plan.effects[1][0] for plan in pairs)
     assert [plan.effects for plan in plans] != [planned(8, index).effects for index in range(200)]
+
+
+def test_plans_of_one_rig_are_of_that_rig() -> None:
+    plans = [planned(7, index, "bearing") for index in range(100)]
+    assert {plan.rig for plan in plans} == {plan.only for plan in plans} == {"bearing"}
+    able = {name for name, e in CAUSES.items() if "bearing" in e.rigs and _sizes(name, "bearing")}
+    first = [plan.effects[0][0] for plan in plans if plan.kind == "single"][: len(able)]
+    assert sorted(first) == sorted(able)
+    assert plans[13].kind == planned(7, 13).kind
+
+
+def _sizes(name: str, rig: str) -> list[float]:
+    return [size for s in SEVERITIES if (size := size_of(name, rig, s)) is not None]

@@ -1,6 +1,6 @@
 """Makes, judges and scores one case, and prints the result as one JSON object.
 
-python -m blind.one SEED INDEX [--workers N] [--cache DIR] [--limit SECONDS]
+python -m blind.one SEED INDEX [--rig NAME] [--workers N] [--cache DIR] [--limit SECONDS]
 """
 
 from __future__ import annotations
@@ -26,12 +26,11 @@ from blind.rigs import RIGS
 from blind.scoring import score
 
 
-def run(seed: int, index: int, workers: int, cache: Path | None, limit_s: float) -> dict[str, Any]:
+def run(plan: Planned, workers: int, cache: Path | None, limit_s: float) -> dict[str, Any]:
     """The result of a case; what goes wrong is told as `failed`."""
-    plan = planned(seed, index)
     result: dict[str, Any] = {**asdict(plan), "severity": plan.severity}
     with tempfile.TemporaryDirectory(prefix="records-") as name:
-        folder = Path(name) if cache is None else cache / f"{seed}-{index}"
+        folder = Path(name) if cache is None else cache / "-".join(_words(plan))
         began = time.process_time()
         places, truth, secret = _records(plan, folder)
         result |= {"truth": truth, "made_s": round(time.process_time() - began, 1)}
@@ -43,6 +42,11 @@ def run(seed: int, index: int, workers: int, cache: Path | None, limit_s: float)
         result["verdict"] = judged.verdict
         result["detector"] = {"largest_db": largest_db(places, RIGS[plan.rig])}
     return result
+
+
+def _words(plan: Planned) -> list[str]:
+    """What tells one case from all others."""
+    return [str(plan.seed), str(plan.index), *filter(None, [plan.only])]
 
 
 def _records(plan: Planned, folder: Path) -> tuple[list[Path], dict[str, Any], Path]:
@@ -66,15 +70,17 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("seed", type=int)
     parser.add_argument("index", type=int)
+    parser.add_argument("--rig", choices=sorted(RIGS), default="")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--cache", type=Path)
     parser.add_argument("--limit", type=float, default=900.0)
     given = parser.parse_args()
+    plan = planned(given.seed, given.index, given.rig)
     try:
-        result = run(given.seed, given.index, given.workers, given.cache, given.limit)
+        result = run(plan, given.workers, given.cache, given.limit)
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        result = {**asdict(planned(given.seed, given.index)), "failed": f"{type(error).__name__}: {error}"}
+        result = {**asdict(plan), "failed": f"{type(error).__name__}: {error}"}
     print(json.dumps(result))
 
 

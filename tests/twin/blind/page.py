@@ -33,10 +33,11 @@ def page(results: Sequence[Result], when: str, command: str) -> str:
 
 
 def _head(results: Sequence[Result], when: str, command: str) -> str:
-    seeds = sorted({one["seed"] for one in results})
-    ranges = "; ".join(
-        f"seed {s}: {_numbers([one['index'] for one in results if one['seed'] == s])}" for s in seeds
-    )
+    runs: dict[str, list[int]] = {}
+    for one in results:
+        of_rig = f", {one['only']} rig only" if one.get("only") else ""
+        runs.setdefault(f"seed {one['seed']}{of_rig}", []).append(one["index"])
+    ranges = "; ".join(f"{run}: {_numbers(indices)}" for run, indices in sorted(runs.items()))
     counted = Counter(one["rig"] for one in results)
     rigs = ", ".join(f"{name} {n}" for name, n in counted.most_common())
     few = (

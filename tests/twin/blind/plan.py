@@ -30,6 +30,8 @@ class Planned:
     rig : str
     effects : tuple of (str, str)
         Names and severities.
+    only : str
+        The rig that all cases of the run are of; "" for all rigs.
     """
 
     seed: int
@@ -37,6 +39,7 @@ class Planned:
     kind: str
     rig: str
     effects: tuple[tuple[str, str], ...]
+    only: str = ""
 
     @property
     def severity(self) -> str:
@@ -45,13 +48,16 @@ class Planned:
 
 
 @cache
-def _singles(seed: int) -> tuple[tuple[str, str, str], ...]:
+def _singles(seed: int, only: str) -> tuple[tuple[str, str, str], ...]:
     """All causes at all severities on all rigs in random order, the causes dealt round by round."""
     rng = np.random.default_rng([seed, 77])
     piles = []
     for name, effect in CAUSES.items():
         pile = [
-            (name, s, rig) for rig in effect.rigs for s in SEVERITIES if size_of(name, rig, s) is not None
+            (name, s, rig)
+            for rig in effect.rigs
+            for s in SEVERITIES
+            if only in ("", rig) and size_of(name, rig, s) is not None
         ]
         piles.append([pile[i] for i in rng.permutation(len(pile))])
     dealt = []
@@ -62,7 +68,7 @@ def _singles(seed: int) -> tuple[tuple[str, str, str], ...]:
 
 
 @cache
-def _outsides(seed: int) -> tuple[tuple[str, str, str], ...]:
+def _outsides(seed: int, only: str) -> tuple[tuple[str, str, str], ...]:
     """Effects from outside the library, medium and strong."""
     rng = np.random.default_rng([seed, 78])
     found = [
@@ -70,22 +76,23 @@ def _outsides(seed: int) -> tuple[tuple[str, str, str], ...]:
         for name, effect in OUTSIDE.items()
         for rig in effect.rigs
         for severity in SEVERITIES[1:]
-        if size_of(name, rig, severity) is not None
+        if only in ("", rig) and size_of(name, rig, severity) is not None
     ]
     return tuple(found[i] for i in rng.permutation(len(found)))
 
 
-def planned(seed: int, index: int) -> Planned:
-    """Case `index` of a seed."""
+def planned(seed: int, index: int, only: str = "") -> Planned:
+    """Case `index` of a seed; of one rig only, if it is named."""
     kind = _PATTERN[index % len(_PATTERN)]
     place = index // len(_PATTERN) * _PATTERN.count(kind) + _PATTERN[: index % len(_PATTERN)].count(kind)
     if kind in ("single", "outside"):
-        dealt = _singles(seed) if kind == "single" else _outsides(seed)
+        dealt = _singles(seed, only) if kind == "single" else _outsides(seed, only)
         name, severity, rig = dealt[place % len(dealt)]
-        return Planned(seed, index, kind, rig, ((name, severity),))
+        return Planned(seed, index, kind, rig, ((name, severity),), only)
+    rig = only or _RIGS[place % len(_RIGS)]
     if kind == "none":
-        return Planned(seed, index, kind, _RIGS[place % len(_RIGS)], ())
-    return Planned(seed, index, kind, *_pair(seed, index, _RIGS[place % len(_RIGS)]))
+        return Planned(seed, index, kind, rig, (), only)
+    return Planned(seed, index, kind, *_pair(seed, index, rig), only)
 
 
 def _pair(seed: int, index: int, rig: str) -> tuple[str, tuple[tuple[str, str], ...]]:

@@ -37,15 +37,22 @@ class Job:
         Processes of the judge.
     cache : str
         Folder that keeps records and truths; "" for none.
+    rig : str
+        That all cases of the run are of; "" for all rigs.
     """
 
-    def __init__(self, seed: int, index: int, workers: int = 2, cache: str = "") -> None:
-        self.seed, self.index, self.workers, self.cache = seed, index, workers, cache
+    def __init__(self, seed: int, index: int, workers: int = 2, cache: str = "", rig: str = "") -> None:
+        self.seed, self.index, self.workers, self.cache, self.rig = seed, index, workers, cache, rig
 
     def words(self) -> list[str]:
         """Arguments of the tests' program."""
         words = [str(self.seed), str(self.index), "--workers", str(self.workers)]
+        words += ["--rig", self.rig] if self.rig else []
         return [*words, "--cache", self.cache] if self.cache else words
+
+    def file(self, out: Path) -> Path:
+        """Where its result is kept."""
+        return out / ("-".join([str(self.seed), str(self.index), *filter(None, [self.rig])]) + ".json")
 
 
 def blind_folder() -> Path:
@@ -112,7 +119,7 @@ def run_blind(
     ----------
     jobs : sequence of Job
     out : Path
-        Folder; each case leaves `<seed>-<index>.json`.
+        Folder; each case leaves `<seed>-<index>.json`, of one rig only `<seed>-<index>-<rig>.json`.
     workers : int
         Cases at a time, here.
     scheduler : str
@@ -126,7 +133,7 @@ def run_blind(
         Results of all jobs, by number.
     """
     out.mkdir(parents=True, exist_ok=True)
-    left = [job for job in jobs if not _file(out, job).is_file()]
+    left = [job for job in jobs if not job.file(out).is_file()]
     done = len(jobs) - len(left)
     with _pool(workers, scheduler) as submit:
         waiting = {submit(job): job for job in left}
@@ -134,10 +141,10 @@ def run_blind(
             result = future.result()
             if result.get("failed") == "interrupted":
                 continue
-            _write(_file(out, job), json.dumps(result) + "\n")
+            _write(job.file(out), json.dumps(result) + "\n")
             done += 1
             tell(result, done, len(jobs))
-    return [json.loads(_file(out, job).read_text(encoding="utf-8")) for job in jobs]
+    return [json.loads(job.file(out).read_text(encoding="utf-8")) for job in jobs]
 
 
 @contextmanager
@@ -199,10 +206,6 @@ def _as_they_come(waiting: dict[Any, Job]) -> Iterator[tuple[Any, Job]]:
             yield future, waiting[future]
 
 
-def _file(out: Path, job: Job) -> Path:
-    return out / f"{job.seed}-{job.index}.json"
-
-
 def _write(path: Path, text: str) -> None:
     """All or nothing, so that a run that is stopped leaves no half result."""
     draft = path.with_suffix(".part")
@@ -213,7 +216,7 @@ def _write(path: Path, text: str) -> None:
 def read_results(out: Path) -> list[Result]:
     """All results in a folder, by seed and number."""
     found = [json.loads(path.read_text(encoding="utf-8")) for path in out.glob("*-*.json")]
-    return sorted(found, key=lambda one: (one["seed"], one["index"]))
+    return sorted(found, key=lambda one: (one["seed"], one.get("only", ""), one["index"]))
 
 
 def write_page(results: Sequence[Result], page: Path, when: str, command: str) -> None:

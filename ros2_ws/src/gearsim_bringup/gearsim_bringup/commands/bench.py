@@ -18,6 +18,7 @@ EXAMPLE = """
 ./gearsim bench --only sim --only dsp --json
 ./gearsim bench --only sim --peers
 ./gearsim bench --blind 300 --seed 1 --workers 2 --out out/blind --page docs/blind.md
+./gearsim bench --blind 60 --rig bearing --out out/blind_bearing
 ./gearsim bench --blind 300 --scheduler tcp://node1:8786
 """
 
@@ -36,6 +37,11 @@ EXAMPLE = """
     help="Let `twin` judge N machines with something hidden in them instead, and write the table.",
 )
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0), help="Of the blind cases.")
+@click.option(
+    "--rig",
+    type=click.Choice(("bearing", "parallel", "planetary")),
+    help="Blind cases of this rig only (default: of all three).",
+)
 @click.option(
     "--first", default=0, show_default=True, type=click.IntRange(0), help="Number of the first blind case."
 )
@@ -59,6 +65,7 @@ def command(
     blind: int | None,
     seed: int,
     first: int,
+    rig: str | None,
     workers: int,
     scheduler: str,
     out: Path,
@@ -72,7 +79,8 @@ def command(
     """
     if blind is not None:
         voice = Voice(json_mode=json_mode)
-        return _blind(voice, range(first, first + blind), seed, workers, scheduler, out, page, cache)
+        numbers = range(first, first + blind)
+        return _blind(voice, numbers, seed, rig or "", workers, scheduler, out, page, cache)
     from gearsim_bringup.bench.groups import DEFAULT, GROUPS
     from gearsim_bringup.bench.peers import install
 
@@ -105,6 +113,7 @@ def _blind(
     voice: Voice,
     numbers: range,
     seed: int,
+    rig: str,
     workers: int,
     scheduler: str,
     out: Path,
@@ -117,7 +126,7 @@ def _blind(
     kept = "" if cache is None else str(cache.absolute())
     # One case has all cores; of several at a time each has one.
     own = min(2, os.cpu_count() or 1) if workers == 1 else 1
-    jobs = [Job(seed, index, own, kept) for index in numbers]
+    jobs = [Job(seed, index, own, kept, rig) for index in numbers]
 
     def tell(result: dict[str, Any], done: int, total: int) -> None:
         hidden = ", ".join(f"{name} ({how})" for name, how in result.get("effects", ())) or "nothing"
@@ -130,7 +139,8 @@ def _blind(
     dates = sorted(
         {time.strftime("%Y-%m-%d", time.localtime(f.stat().st_mtime)) for f in out.glob("*-*.json")}
     )
-    line = f"./gearsim bench --blind {len(numbers)} --seed {seed} --out {out} --page {target}"
+    only = f" --rig {rig}" if rig else ""
+    line = f"./gearsim bench --blind {len(numbers)} --seed {seed}{only} --out {out} --page {target}"
     write_page(read_results(out), target, " to ".join(dict.fromkeys((dates[0], dates[-1]))), line)
     voice.say(f"written: {target}")
     voice.result({"cases": len(results), "page": str(target), "results": str(out)})
