@@ -179,3 +179,23 @@ def test_a_bearing_that_hardly_hears_its_lines_is_not_the_one_that_makes_them():
         )
         verdict = verdict_of(data, RATE, plate, Signal(bad, RATE, turns).tacho())
         assert [(f.component, f.fault) for f in verdict.findings] == found
+
+
+def test_a_ring_on_the_shaft_may_ring_the_pedestal_of_another_bearing_on_it():
+    """At a low load the shaft need not press on the bearing whose inner race is bad."""
+    order = 10 - 3.93
+    rng = np.random.default_rng(1)
+    turns = turns_of(SPEED, 4.0, RATE)
+    swing = 1.0 + 0.5 * np.cos(2 * np.pi * turns)
+    bad = defect(rng, turns, RATE, order, slip=0.002).x * swing
+    data = np.stack([0.02 * noise(rng, turns.size) + bad, 0.02 * noise(rng, turns.size) + 0.25 * bad])
+    tacho = Signal(bad, RATE, turns).tacho()
+    (finding,) = verdict_of(data, RATE, _plate(3.93), tacho).findings
+    assert (finding.component, finding.fault) == ("bearing_2", "inner_race")
+    plate = _plate(3.93)
+    apart = replace(
+        plate,
+        shafts=(*plate.shafts, Shaft("other", 0.83, float("nan"))),
+        bearings=(replace(plate.bearings[0], shaft="other"), plate.bearings[1]),
+    )
+    assert verdict_of(data, RATE, apart, tacho).findings == ()

@@ -72,6 +72,20 @@ def test_harmonics_that_are_parted_prove_a_race_whose_first_ones_are_not():
         assert finding.evidence["dominance"] > 20.0
 
 
+def test_harmonics_that_fall_on_a_shafts_count_as_those_that_do_not():
+    """Of 1.992 the first five lines fall on the shaft's even ones; of 1.9 none; their impacts are alike."""
+    sizes = []
+    for order in (1.992, 1.9):
+        rng = np.random.default_rng(0)
+        turns = turns_of(SPEED, 4.0, RATE)
+        bad = defect(rng, turns, RATE, order, slip=0.0)
+        (finding,) = _verdict(noise(rng, turns.size) + 0.17 * bad.x, turns, _plate(order, 6)).findings
+        assert finding.fault == "outer_race"
+        assert finding.found_order == pytest.approx(order, rel=1e-3)
+        sizes.append(finding.evidence["modulation"])
+    assert 0.5 < sizes[0] / sizes[1] < 1.1, sizes
+
+
 def test_impacts_once_a_turn_and_low_harmonics_are_not_taken_for_it():
     """A bad tooth has all harmonics alike; runout and couplings the low ones."""
     for seed in range(4):

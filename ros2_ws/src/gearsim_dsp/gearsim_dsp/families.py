@@ -120,12 +120,12 @@ class FamilySearch:
     def judge(self, family: FaultFamily) -> FamilyEvidence:
         """Evidence of a family on this channel; where a shaft covers it, the better of two ways to look.
 
-        Where harmonics that can be parted from the shaft's prove the family, all count for its size.
+        Where harmonics that can be parted from the shafts' prove the family, all count for its size.
         """
         plain = self._judged(family, None)
         multiple = covering_multiple(self._machine, family, self._resolution / self._scale, self._doubt)
         if multiple is None:
-            return plain
+            return replace(plain, modulation=self._filled_size(plain)) if proves(plain) else plain
         if proves(plain):
             size = max(plain.modulation, self._whole_size(plain, multiple))
             plain = replace(plain, modulation=size, covered_by=multiple)
@@ -136,6 +136,23 @@ class FamilySearch:
         grid = self._grid(found.family, found.found_order * self._scale, 0.0)
         sizes = self._modulation(self._view_of(multiple), grid, 0)
         return float(sizes[self._spectra.bands.index(found.band)])
+
+    def _filled_size(self, found: FamilyEvidence) -> float:
+        """Modulation with harmonics that fall on a shaft's taken as high as the next one that does not.
+
+        Impacts have harmonics that fall off with their number; what falls on a shaft's line cannot be seen.
+        """
+        grid = self._grid(found.family, found.found_order * self._scale, 0.0)
+        row = self._view.excess[self._spectra.bands.index(found.band)]
+        more = above = 0.0
+        for line in grid.harmonics[0][::-1]:
+            if line < 0:
+                continue
+            if not self._view.usable[line]:
+                more += above
+            elif not self._explained[line]:
+                above = 2.0 * max(float(row[line]), 0.0)
+        return found.modulation + more
 
     def _judged(self, family: FaultFamily, multiple: ShaftMultiple | None) -> FamilyEvidence:
         half_width = family.tolerance + self._doubt

@@ -154,9 +154,23 @@ def _is_its_own(
     best = _best(judged)
     component = _component(machine, group, judged)[0].component
     own = [e.channel for e in judged if e.channel in machine.bearing(component).channels]
-    if own and heard_at(judged, own, [e.channel for e in judged if e.channel not in own]) < _LEAST_HEARD:
+    passed_on = _reached_by_the_shaft(machine, component, best.family)
+    there = [e.channel for e in judged if e.channel not in own and e.channel not in passed_on]
+    if own and heard_at(judged, own, there) < _LEAST_HEARD:
         return False
     return not any(is_companion(machine, component, judged, best, one, resolution) for one in findings)
+
+
+def _reached_by_the_shaft(machine: Machine, component: str, family: FaultFamily) -> set[str]:
+    """Channels that may hear a fault of the ring on the shaft louder than its own bearing's do.
+
+    Its impacts go into the shaft as much as into the casing, and ring the pedestal on which the shaft
+    presses; at a low load that may be another one.
+    """
+    bearing = machine.bearing(component)
+    if not math.isclose(family.sideband_order, machine.shaft(bearing.shaft).ratio, rel_tol=1e-9):
+        return set()
+    return {name for one in machine.bearings if one.shaft == bearing.shaft for name in one.channels}
 
 
 def _merit(evidence: FamilyEvidence, speed: ShaftSpeed) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from gearsim_dsp.judges.finding import LEAST_CONFIDENCE, Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.registry import judge_all
@@ -9,6 +11,7 @@ from gearsim_dsp.judges.registry import judge_all
 __all__ = ["all_findings"]
 
 _SAME_ORDER = 0.012
+_SAME_SPEED = 1e-6
 _CLEARLY_ITS_OWN = 3.0
 # What a shaft that shakes its wheel looks like to the judge of gears.
 _SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
@@ -50,7 +53,7 @@ def _is_shaken(finding: Finding) -> bool:
 
 def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bool:
     """At a multiple of the tooth's rate; or in a planet, where the carrier's sidebands of it are."""
-    if _is_multiple(bearing, tooth):
+    if _is_multiple(bearing, tooth) or _is_covered(bearing, tooth, measured):
         return True
     planets = {stage.planet_shaft for stage in measured.machine.planetary_stages}
     inside = measured.machine.bearing(bearing.component).shaft in planets
@@ -60,6 +63,14 @@ def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bo
         and tooth.fault.startswith("planet_")
         and isinstance(dominance, float)
         and dominance < _CLEARLY_ITS_OWN
+    )
+
+
+def _is_covered(bearing: Finding, tooth: Finding, measured: Measured) -> bool:
+    """Lines that the record does not part from those of the tooth's shaft, which are its impacts'."""
+    _, _, shaft = str(bearing.evidence.get("covered_by", "")).partition(" x ")
+    return bool(shaft) and math.isclose(
+        measured.machine.shaft(shaft).ratio, tooth.found_order, rel_tol=_SAME_SPEED
     )
 
 
