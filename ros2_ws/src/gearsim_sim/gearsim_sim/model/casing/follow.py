@@ -74,8 +74,8 @@ class Leftover:
     def most_below(self, square: float, boundary: Array, squares: Array, coupling: Array) -> int:
         """At most so many eigenvalues of the whole structure lie below `square`, which is below the cut-off.
 
-        Those of the kept modes, and the negative ones of the masters' dynamic stiffness (Sylvester's law;
-        Wittrick and Williams, 1971). To the latter each mode left out adds `-square^2 a a' / (lambda_d -
+        Those of the modes given, and the negative ones of the masters' dynamic stiffness (Sylvester's law;
+        Wittrick and Williams, 1971). To the latter each further mode adds `-square^2 a a' / (lambda_d -
         square)`; all of them together no more than the three moments known and a bound of the rest.
 
         Parameters
@@ -84,7 +84,7 @@ class Leftover:
         boundary : Array, shape (masters, masters)
             Stiffness less `square` times mass of the masters alone.
         squares, coupling : Array, shape (modes,), (modes, masters)
-            Of the kept modes.
+            Of all modes up to the cut-off, masters held.
         """
         rest = self.cutoff / (self.cutoff - square)
         added = self.stiffness + square * self.mass + square**2 * rest * self.follow

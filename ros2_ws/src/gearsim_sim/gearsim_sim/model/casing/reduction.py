@@ -31,6 +31,10 @@ from gearsim_sim.model.casing.structure import Structure
 # Largest error of an own frequency, relative, up to each frequency [Hz]; the last one holds beyond too.
 ACCURACY = ((1000.0, 0.001), (2000.0, 0.003), (4000.0, 0.006))
 
+# Modes computed beyond those kept, over their number: what they add is then known, and only what lies still
+# higher must be bounded. Measured on the shipped casing: valid up to 4.03 kHz in place of 3.50.
+BEYOND = 0.1
+
 # Eigenvalues below that of 1 Hz are those of rigid-body motion, which is exact.
 _RIGID = (2 * np.pi) ** 2
 
@@ -119,9 +123,10 @@ def craig_bampton(
     tell("static shapes", 0.15)
     static = -factor.solve(parts.k_sm)
     tell("modes", 0.2)
-    squares, shapes = lowest_modes(parts.k_ss, parts.m_ss, modes + 1, factor=factor)
+    found = min(modes + 1 + int(np.ceil(BEYOND * modes)), len(others) - 1)
+    squares, shapes = lowest_modes(parts.k_ss, parts.m_ss, found, factor=factor)
     tell("residual vectors", 0.9)
-    work = _Work(parts, static, squares, shapes, factor)
+    work = _Work(parts, static, modes, squares, shapes, factor)
     counts = range(0, min(len(held), modes // 2) + 1, 2) if residuals is None else (residuals,)
     best = max((work.choice(count) for count in counts), key=lambda choice: choice.valid)
     return work.finish(structure, held, others, best)
@@ -145,18 +150,23 @@ class _Choice:
 class _Work:
     """What all choices of residual vectors share."""
 
-    def __init__(self, parts: _Parts, static: Array, squares: Array, shapes: Array, factor: Any) -> None:
+    def __init__(
+        self, parts: _Parts, static: Array, modes: int, squares: Array, shapes: Array, factor: Any
+    ) -> None:
         self.parts, self.static, self.squares, self.shapes = parts, static, squares, shapes
-        self.modes = len(squares) - 1
+        self.modes = modes
         coupling = parts.m_sm + parts.m_ss @ static
         self.coupling = coupling
         self.pull = shapes.T @ coupling
         self.rest = self._without_modes(factor.solve(coupling), shapes)
         moved = parts.m_ss @ self.rest
         again = self._without_modes(factor.solve(moved), shapes)
-        # Here all modes found are taken away, the one beyond those asked for too.
+        # Here all modes found are taken away, those beyond the ones asked for too.
         self.leftover = Leftover(
-            _even(coupling.T @ self.rest), _even(moved.T @ self.rest), _even(moved.T @ again), np.inf
+            _even(coupling.T @ self.rest),
+            _even(moved.T @ self.rest),
+            _even(moved.T @ again),
+            float(squares[-1]),
         )
 
     def _without_modes(self, columns: Array, shapes: Array) -> Array:
@@ -177,25 +187,24 @@ class _Work:
         squares, vectors = reduced_modes(mass, stiffness)
         count = len(m_bb)
         errors = left.errors(squares, vectors[:count], vectors[count + kept :], combinations)
-        valid = self._valid(left, kept, (m_bb, k_bb), squares)
+        valid = self._valid(left.cutoff, (m_bb, k_bb), squares)
         return _Choice(kept, combinations, mass, stiffness, errors, squares, left.cutoff, valid)
 
-    def _valid(self, left: Leftover, kept: int, boundary: tuple[Array, Array], squares: Array) -> float:
+    def _valid(self, cutoff: float, boundary: tuple[Array, Array], squares: Array) -> float:
         """Up to here the whole structure has no mode that the reduced one misses by more than is allowed.
 
         Eigenvalues of the reduced structure are never too low. The k-th one is low enough if no more than k
-        of the whole structure lie below it less what is allowed.
+        of the whole structure lie below it less what is allowed. Never beyond the first mode left out.
         """
         mass, stiffness = boundary
-        own = self.squares[:kept], self.pull[:kept]
 
         def most_below(square: float) -> int:
-            return left.most_below(square, stiffness - square * mass, *own)
+            return self.leftover.most_below(square, stiffness - square * mass, self.squares, self.pull)
 
         allowed = allowed_errors(np.sqrt(np.maximum(squares, 0)) / (2 * np.pi))
         sure = 0.0
         for k, least in enumerate((squares * (1 - allowed) ** 2).tolist()):
-            if least >= left.cutoff:
+            if least >= cutoff:
                 break
             if squares[k] > _RIGID and most_below(least) > k:
                 return _last(most_below, k, sure, least)
