@@ -13,6 +13,7 @@ from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.tooth.stiffness import stiffness_series
 
 # Part of its least stiffness that a mesh must keep at the highest severity.
+_PER_TOOTH = 64  # angles at which what is left is looked at
 _LEAST = 0.1
 
 
@@ -62,12 +63,12 @@ def stiffness_mod(plant: Plant, wheel: GearWheel, series: PeriodicSeries, max_se
         If less than a tenth of the least stiffness would be left anywhere at the highest severity.
     """
     teeth = wheel.gear.teeth
-    turns = np.arange(64 * teeth) / (64 * teeth)
-    own = stiffness_series(wheel.pair, wheel.harmonics)
-    sound = scale_of(plant, wheel) * own.value(turns * teeth)
-    left = sound + max_severity * series.value(turns)
+    own = stiffness_series(wheel.pair, wheel.harmonics).on_grid(_PER_TOOTH)
+    sound = scale_of(plant, wheel) * np.tile(own, teeth)
+    change = series.on_grid(_PER_TOOTH * teeth)
+    left = sound + max_severity * change
     if np.min(left) < _LEAST * np.min(sound):
-        lost = f"{100 * float(np.max(-series.value(turns) / sound)):.3g} % less"
+        lost = f"{100 * float(np.max(-change / sound)):.3g} % less"
         expected = f"less than {100 * (1 - _LEAST) / max_severity:.3g} % lost at severity 1"
         raise InputError(wheel.name, "stiffness", lost, expected)
     return MeshMod(wheel.mesh, STIFFNESS, wheel.track, wheel.placed(series))

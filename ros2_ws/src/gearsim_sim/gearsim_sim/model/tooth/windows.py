@@ -17,6 +17,7 @@ _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(16)
 # 1e-6 of the integrand (Gauss-Legendre: once past pi nodes per period, faster than any power).
 _PERIODS = 4.0
 _LONGEST_PANEL = 0.125
+_WAVES_AT_ONCE = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +64,23 @@ def window_series(nodes: Nodes, values: Array, teeth: int, tooth: int, harmonics
     """
     orders = np.arange(1, harmonics * teeth + 1)
     turns = (nodes.phase + tooth + 0.5) / teeth
-    angle = 2 * np.pi * np.outer(orders, turns)
     weighted = nodes.weight * values / teeth
+    found = _transform(turns, weighted, orders.size)
     taper = 2 * np.sinc(orders / ((harmonics + 1) * teeth))
     return PeriodicSeries(
         mean=float(np.sum(weighted)),
         orders=orders,
-        cosine=taper * (np.cos(angle) @ weighted),
-        sine=taper * (np.sin(angle) @ weighted),
+        cosine=taper * found.real,
+        sine=taper * found.imag,
     )
+
+
+def _transform(turns: Array, weighted: Array, count: int) -> NDArray[np.complex128]:
+    """sum of weighted exp(2 pi i k turns) for k = 1 to count, each wave a product of two."""
+    angle = 2j * np.pi * turns
+    fine = np.exp(np.multiply.outer(np.arange(_WAVES_AT_ONCE), angle))
+    coarse = np.exp(np.multiply.outer(1 + _WAVES_AT_ONCE * np.arange(-(-count // _WAVES_AT_ONCE)), angle))
+    return np.asarray(((coarse * weighted) @ fine.T).ravel()[:count])
 
 
 def truncation_error(
