@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from gearsim_dsp.judges.drift import drifting_races
 from gearsim_dsp.judges.finding import LEAST_CONFIDENCE, Finding
 from gearsim_dsp.judges.measured import Measured
 from gearsim_dsp.judges.registry import judge_all
@@ -36,6 +37,7 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     beside one that is told nothing is said of wear.
     """
     others = judge_all(measured)
+    bearings = bearings or drifting_races(measured)
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
     kept = [one for one in bearings if not any(_is_teeths_doing(one, tooth, measured) for tooth in teeth)]
     shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
