@@ -23,6 +23,7 @@ from scipy.signal import butter, sosfilt
 
 from gearsim_dsp.kinematics import bearing_orders
 from gearsim_io.errors import InputError
+from gearsim_twin.compare.features import features
 from gearsim_twin.compare.nuisances import (
     ChannelNuisance,
     Limits,
@@ -159,3 +160,20 @@ def test_places_must_be_the_same():
         fit_nuisance(real[0], some)
     with pytest.raises(InputError, match="pairs"):
         fit_nuisances([])
+
+
+def test_noise_makes_bursts_steady_and_two_halves_alike_as_the_formulas_say():
+    """A signal that is nearly always silent, loud at the end and lopsided, beside noise as strong as it."""
+    t = np.linspace(0.0, 1.0, noise(90).size)
+    bursts = 3.0 * np.abs(noise(90)) * ((np.arange(t.size) // 4000) % 4 == 0) * (0.6 + 0.8 * t)
+    bursts -= bursts.mean()
+    hiss = bursts.std() * noise(91, pole=0.0) / noise(91, pole=0.0).std()
+    plan = plan_of(view(record(bursts)))
+    alone, both = features(view(record(bursts)), plan), features(view(record(bursts + hiss)), plan)
+    density_db = 10 * math.log10(2 * float(hiss.var()) / RATE_HZ)
+    shown = apply(Nuisance((ChannelNuisance("b1_y", floor_db=(density_db,)),)), alone)
+    kinds = ("fluctuation", "quiet", "loud", "asymmetry")
+    for k, place in enumerate(plan.places):
+        if place.kind in kinds:
+            assert abs(alone.level_db[k] - both.level_db[k]) > 1.0, place.kind
+            assert shown.level_db[k] == pytest.approx(both.level_db[k], abs=0.5), place.kind

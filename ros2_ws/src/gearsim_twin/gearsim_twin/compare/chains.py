@@ -11,7 +11,9 @@ in the band, and s the model's share of its power,
 
     squared envelope spectrum     X' = s^2 X + X_Gauss B (int (S + N)^2 - int S^2) / (int S + N)^2
     kurtosis, scatter             X' = s^2 X + (1 - s^2) X_Gauss
-    peaks of the squared signal   X' = s X + (1 - s) X_Gauss
+    peaks of the squared signal   X' = s X + (1 - s) X_Gauss        (and extremes of the short-time power)
+    one half over the other       X' = (r X + (1 - r) (1 + X) / 2) / (r + (1 - r) (1 + X) / 2),
+                                  r = s of end over beginning, s^1.5 (as of a skewness) of above over below 0
     coherence                     X' = r X + (1 - r) X_Gauss,  r the mean of (S / (S + N))^2 over the band
 
 (the first by the products of the spectra of model and noise that its floor is made of; of white noise it is
@@ -36,7 +38,9 @@ __all__ = ["ChannelNuisance", "Nuisance", "apply"]
 Vector = NDArray[np.float64]
 
 _TINY = 1e-300
-_FIRST_ORDER_KINDS = ("crest", "peak")
+_FIRST_ORDER_KINDS = ("crest", "peak", "quiet", "loud")
+# Ratios of two halves, and to which power of the model's share they are kept.
+_HALVES = {"asymmetry": 1.5, "drift": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +148,22 @@ def _shift_rest(
             mixture = _Mixture.of(simulated, rows, chain, None)
             before = max(10 ** (0.1 * float(old.level_db[k])), _TINY)
             _mixed(old, new, one, np.array([mixture.model / before]), np.array([mixture.noise]))
+        elif place.kind in _HALVES and place.band_hz in shares:
+            _shift_ratio(old, new, k, shares[place.band_hz].share ** _HALVES[place.kind])
         elif math.isfinite(old.gauss_db[k]) and place.band_hz in shares:
             factor, rest = shares[place.band_hz].dilution(place)
             _mixed(old, new, one, np.array([factor]), np.array([rest * 10 ** (0.1 * old.gauss_db[k])]))
+
+
+def _shift_ratio(old: Levels, new: dict[str, Vector], k: int, share: float) -> None:
+    """Of a ratio of two halves, to which noise adds alike."""
+    ratio = 10 ** (0.1 * float(old.level_db[k]))
+    added = (1 - share) * (1 + ratio) / 2
+    above, below = share * ratio + added, share + added
+    new["level_db"][k] = 10 * math.log10(max(above, _TINY) / max(below, _TINY))
+    # Derivative of the new level by the old one.
+    slope = ratio * ((share + (1 - share) / 2) / above - (1 - share) / 2 / below)
+    new["std_db"][k] = old.std_db[k] * abs(slope)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,9 +217,14 @@ class _Mixture:
         coherent = float(np.sum((model / both) ** 2 * width)) / extent
         return cls(float(np.sum(model * width)), float(np.sum(noise * width)), crossed, coherent)
 
+    @property
+    def share(self) -> float:
+        """Of the model in the power."""
+        return self.model / max(self.model + self.noise, _TINY)
+
     def dilution(self, place: Place) -> tuple[float, float]:
         """Factor of what the model has, and share of what Gaussian noise would have."""
-        share = self.model / max(self.model + self.noise, _TINY)
+        share = self.share
         if place.kind in _FIRST_ORDER_KINDS:
             return share, 1 - share
         if place.domain == "cyclic":

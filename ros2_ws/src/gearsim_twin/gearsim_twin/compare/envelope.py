@@ -35,6 +35,8 @@ _LEAST_RATIO = 4.0
 _TURNS = 4
 _BIN_VARIANCE = 1.944
 _FEWEST_FLOOR_BINS = 8
+_FLOOR_SHARE = 0.9  # of a band's width, in which its envelope has a floor
+_HALVINGS = 30
 
 
 def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
@@ -199,9 +201,8 @@ def _in_band(
     gauss = 10 * np.log10(bins * step_hz * density)
     for k, place in enumerate(chosen):
         if place.kind == "floor":
-            level[k], std[k] = _floor(material, place.channel, band)
+            level[k], std[k], gauss[k] = _floor(material, place.channel, band)
             height[k], clear[k] = np.inf, 0.0
-            gauss[k] = 10 * math.log10(1.5 * step_hz * density[k])
     return Levels.of(level, std, height_db=height, clear_db=clear, gauss_db=gauss)
 
 
@@ -240,19 +241,32 @@ def _sidebands(frame: Frame, family: Family) -> list[tuple[int, float]]:
     return found
 
 
-def _floor(material: Material, channel: str, band: tuple[float, float]) -> tuple[float, float]:
-    """Mean level of bins between turns and families, and its standard deviation."""
+def _floor(material: Material, channel: str, band: tuple[float, float]) -> tuple[float, float, float]:
+    """Mean level of bins between turns and families, its standard deviation, and that of Gaussian noise."""
     spectra = material.envelope_spectra(channel, band)
-    bins = _between(material.frame, spectra.step, spectra.mean.size)
+    # Two components of a band are apart by no more than its width.
+    width = (band[1] - band[0]) / (spectra.step * material.speed_hz)
+    bins = _between(material.frame, spectra.step, min(spectra.mean.size, int(_FLOOR_SHARE * width)))
     if bins.size < _FEWEST_FLOOR_BINS:
-        return math.nan, math.inf
+        return math.nan, math.inf, math.nan
     # Medians: strange lines and the skirts of lines that slip do not move them. Of noise (exponential) the
     # median is ln 2 of the mean, and that of n values has the relative variance 1 / (n ln^2 2).
     each = np.median(spectra.power[:, bins], axis=1) / math.log(2)
     value = max(float(each.mean()), 1e-300)
     theory = value**2 * _BIN_VARIANCE / (bins.size * math.log(2) ** 2) / spectra.averages
     variance = united_variance(theory, each, spectra.averages)
-    return 10 * math.log10(value), max(DB * math.sqrt(variance) / value, LEAST_STD_DB)
+    gauss = 1.5 * 2 / width * _median_share(1 - bins / width) / math.log(2)
+    return 10 * math.log10(value), max(DB * math.sqrt(variance) / value, LEAST_STD_DB), 10 * math.log10(gauss)
+
+
+def _median_share(means: NDArray[np.float64]) -> float:
+    """Median of exponential values with these means, by bisection."""
+    low, high = 0.0, float(means.max())
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = float(np.mean(1 - np.exp(-middle / means))) < 0.5
+        low, high = (middle, high) if below else (low, middle)
+    return 0.5 * (low + high)
 
 
 def _between(frame: Frame, step: float, lines: int) -> NDArray[np.intp]:

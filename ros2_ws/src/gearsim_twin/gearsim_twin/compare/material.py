@@ -20,7 +20,7 @@ __all__ = ["BandEnvelope", "Material"]
 
 _TAPER = 0.02
 _PER_ORDER = 2.6
-_ENVELOPE_MARGIN = 1.25
+_ENVELOPE_MARGIN, _PER_WAVE = 1.25, 6
 
 
 class BandEnvelope:
@@ -165,14 +165,14 @@ class Material:
         full = 0.5 * (z.real**2 + z.imag**2)
         total = good_length(self.samples(channel).size)
         top = self.frame.highest_envelope_order * self.speed_hz if self.frame.has_orders else 200.0
-        # Four samples for the highest wave: read linearly between them it loses less than 10 % (-1 dB), on
-        # both sides alike.
-        wanted = max(64, math.ceil(4 * _ENVELOPE_MARGIN * top * total / self.rate_hz))
-        if wanted < full.size:
-            length = int(sfft.next_fast_len(wanted, real=True))
-            lines = sfft.rfft(full)[: length // 2 + 1]
-            full = np.asarray(sfft.irfft(lines, length), dtype=np.float64) * (length / full.size)
-            stride = total / length
+        # What is beyond would be folded down by the reading at equal angles. That reads linearly between
+        # samples, seven for the highest wave, and so takes off sinc^2 of the frequency over their rate.
+        kept = max(16, math.ceil(_ENVELOPE_MARGIN * top * total / self.rate_hz))
+        length = int(sfft.next_fast_len(max(64, _PER_WAVE * kept), real=True))
+        lines = sfft.rfft(full)[:kept]
+        lines /= np.sinc(np.arange(lines.size) / length) ** 2
+        full = np.asarray(sfft.irfft(lines, length), dtype=np.float64) * (length / full.size)
+        stride = total / length
         edge = math.ceil(_TAPER * full.size)
         times = stride * np.arange(full.size, dtype=np.float64)
         return BandEnvelope(full[edge : full.size - edge], times[edge : full.size - edge])

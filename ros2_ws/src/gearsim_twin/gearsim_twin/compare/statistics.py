@@ -2,8 +2,9 @@
 
 Kinds: rms (dB of the unit squared) and kurtosis of a band, and of the whole channel crest (peak over rms),
 asymmetry (mean square above over below zero), drift (change of the short-time level over the record),
-fluctuation (scatter of the short-time level, in dB of 0.2 dB), quiet and loud (extremes of it). Standard
-deviations are those of figures of parts of the record, left out in turn.
+fluctuation (scatter of the short-time power, in dB of 0.2 dB), quiet and loud (its extremes over its mean).
+Standard deviations are those of figures of parts of the record, left out in turn. Steadiness is told of
+powers, not of levels, so that what noise makes of it follows in closed form.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ _PARTS, _FEWEST_PARTS = 12, 6
 _FIGURES = ("rms", "kurtosis", "crest", "asymmetry", "drift", "fluctuation", "quiet", "loud")
 _BLOCKS = 40
 _SCATTER_DB = 0.2
+_LEAST_SHARE = 1e-4
+_EXTREME, _MOST_STD_DB = 2.2, 10.0
 _THEORY_PARTS = 4.0
 _GAUSS_KURTOSIS_DB = 10 * math.log10(3.0)
 _GAUSS_BAND_DB = 10 * math.log10(2.0)
@@ -75,7 +78,7 @@ def _figure(material: Material, place: Place) -> tuple[float, float, float]:
         return (*_of_parts(parts, lambda m: _db(m[0]) - _db(m[1])), math.nan)
     if place.kind == "crest":
         return _crest(square, edges)
-    return (*_steadiness(material, square, place.kind), 0.0 if place.kind == "fluctuation" else math.nan)
+    return _steadiness(material, square, place.kind)
 
 
 def _db(value: float) -> float:
@@ -127,28 +130,38 @@ def _crest(square: NDArray[np.float64], edges: NDArray[np.intp]) -> tuple[float,
     return float(each.mean()), max(float(each.std(ddof=1)) / math.sqrt(each.size), LEAST_STD_DB), gauss
 
 
-def _steadiness(material: Material, square: NDArray[np.float64], kind: str) -> tuple[float, float]:
-    """Drift, scatter and extremes of the level over short blocks, each a turn of the shaft or longer."""
+def _steadiness(material: Material, square: NDArray[np.float64], kind: str) -> tuple[float, float, float]:
+    """Drift, scatter and extremes of the power of short blocks, each a turn of the shaft or longer."""
     edges = _edges(material, square.size, 0, 1.0, _BLOCKS)
     power = _means(edges, square)[:, 0]
-    least = 1e-4 * float(power.mean())
-    level = 10 * np.log10(np.maximum(power, least if least > 0 else 1e-300))
+    share = power / max(float(power.mean()), 1e-300)
     count = power.size
     time = 0.5 * (edges[1:] + edges[:-1]) / square.size
     time = time - time.mean()
-    slope = float(np.sum(time * level) / np.sum(time**2))
-    rest = level - level.mean() - slope * time
-    scatter = float(np.sqrt(np.sum(rest**2) / (count - 2)))
+    # A block of n samples of white noise has a power known to sqrt(2 / n) of it.
+    chance = math.sqrt(2.0 * count / square.size)
     if kind == "drift":
-        return slope, max(scatter / math.sqrt(float(np.sum(time**2))), LEAST_STD_DB)
+        return (*_drift(time, 10 * np.log10(np.maximum(share, _LEAST_SHARE))), math.nan)
+    rest = share - 1.0 - time * (np.sum(time * share) / np.sum(time**2))
+    scatter = float(np.sqrt(np.sum(rest**2) / (count - 2)))
     if kind == "fluctuation":
-        value = 1 + (scatter / _SCATTER_DB) ** 2
-        share = 1 - 1 / value
+        value = 1 + (DB * scatter / _SCATTER_DB) ** 2
         # The variance of a variance, with the kurtosis that the blocks have.
         kurtosis = float(np.mean(rest**4) / max(float(np.mean(rest**2)) ** 2, 1e-300))
         spread = math.sqrt(max(kurtosis - 1, 2.0) / count)
-        return 10 * math.log10(value), max(DB * share * spread, LEAST_STD_DB)
-    # Extremes of some forty Gaussian values scatter by 0.45 of their standard deviation, the median by 0.2.
-    centre = float(np.median(level))
-    extreme = float(level.min() if kind == "quiet" else level.max())
-    return extreme - centre, max(0.5 * scatter, LEAST_STD_DB)
+        std = max(DB * (1 - 1 / value) * spread, LEAST_STD_DB)
+        return 10 * math.log10(value), std, 10 * math.log10(1 + (DB * chance / _SCATTER_DB) ** 2)
+    # Extremes of some forty Gaussian values are 2.2 standard deviations off and scatter by 0.45 of one.
+    side = -1.0 if kind == "quiet" else 1.0
+    extreme = max(float(side * np.max(side * share)), _LEAST_SHARE)
+    std = max(min(DB * 0.5 * scatter / extreme, _MOST_STD_DB), LEAST_STD_DB)
+    return 10 * math.log10(extreme), std, 10 * math.log10(1 + side * _EXTREME * min(chance, 0.4))
+
+
+def _drift(time: NDArray[np.float64], level: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope of levels over the record, and its standard deviation."""
+    squares = float(np.sum(time**2))
+    slope = float(np.sum(time * level)) / squares
+    rest = level - level.mean() - slope * time
+    scatter = math.sqrt(float(np.sum(rest**2)) / (level.size - 2))
+    return slope, max(scatter / math.sqrt(squares), LEAST_STD_DB)
