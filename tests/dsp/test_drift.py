@@ -108,8 +108,8 @@ def test_a_drift_that_the_bearing_cannot_have_is_not_told():
 
 
 def test_an_outer_race_that_drifts_is_no_inner_race():
-    """Four impacts a turn, not one: 4.01 elements pass the outer race, and 5.99 the inner."""
+    """Four impacts a turn, not one: 4.003 elements pass the outer race, and 5.997 the inner."""
     turns = turns_of(SPEED, 4.0, RATE)
     rng = np.random.default_rng(4)
-    x = 1.5 * defect(rng, turns, RATE, 4.01, slip=0.0).x + noise(rng, turns.size)
-    assert drifting_races(_measured(x, turns, _plate(5.99))) == ()
+    x = 1.5 * defect(rng, turns, RATE, 4.003, slip=0.0).x + noise(rng, turns.size)
+    assert drifting_races(_measured(x, turns, _plate(5.997))) == ()
