@@ -249,7 +249,7 @@ def test_at_rest_nothing_moves():
     )
     forces = np.array([3.0, -1.0])
     position = of.shapes.T @ forces / of.omega**2
-    state = pack_carrier_state(of, 1e-5, position, forces, np.zeros(2))
+    state = pack_carrier_state(of, 1e-5, position, forces, of.shapes @ position, np.zeros(2))
     weights = oscillator_weights(of.omega, of.damping_ratios, 1e-5)
     w = state[0:2] + 1j * state[8:10] + weights.gain * (of.shapes.T @ forces)
     z = w + (weights.now + weights.before + weights.earlier) * (of.shapes.T @ forces)

@@ -15,6 +15,7 @@ MACHINES = {
     "cb146": "unsw_parallel",
     "cb182": "unsw_parallel",
     "planetary18": "unsw_planetary",
+    "planetary_cb": "unsw_planetary",
     "bearing2": "mfpt",
     "bearing4": "mfpt",
     "bearing5": "mfpt",

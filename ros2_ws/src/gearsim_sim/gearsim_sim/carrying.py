@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -20,7 +21,9 @@ from gearsim_sim.integrate.carrier_kernel import (
 from gearsim_sim.integrate.coefficients import padded
 from gearsim_sim.integrate.modes import ComplexModes
 from gearsim_sim.model.assembly import Vector
+from gearsim_sim.model.carrier import turn_matrix
 from gearsim_sim.model.plant import GRAVITY, Plant, RotatingSite, StateRow
+from gearsim_sim.model.side_data import SideStructure, no_structure
 
 Array = NDArray[np.float64]
 
@@ -59,6 +62,7 @@ class Carrying:
         carrier = plant.carrier
         if carrier is None and forces:
             raise InputError("engine", "forces", True, "a machine in a flexible casing, such as cb146")
+        self.side = no_structure()
         if carrier is None:
             return
         system = plant.system
@@ -76,17 +80,38 @@ class Carrying:
         self.modes, self.interfaces = padded(carrier.omega.size), len(carrier.interfaces)
         mine = [i for i, row in enumerate(rows) if carrier.carries({**row.displacement, **row.rate})]
         self.state_rows = np.array(mine, dtype=np.int64)
+        weights = oscillator_weights(carrier.omega, carrier.damping_ratios, step_s)
+        self.side = SideStructure(carrier.dofs, self._of, felt.astype(np.int64), weights)
         self.data = Carrier(
             k=pack_carrier(self._of, step_s),
             places=place[self._own],
+            bare=place[self._own[self._bare()]],
+            turning=np.array([[one.first, one.track] for one in carrier.turning], dtype=np.int64).reshape(
+                -1, 2
+            ),
             numbers=np.array([carrier.stiffness_n_per_m, carrier.damping_ns_per_m]),
             site_index=felt.astype(np.int64),
             force_index=len(sites) + np.arange(len(self._own) if forces else 0),
             per_slope=1 / (12 * step_s),
             state_rows=self._flat_rows([rows[i] for i in mine]),
             state_weights=self._state_weights(),
-            poles=self._flat(oscillator_weights(carrier.omega, carrier.damping_ratios, step_s).rate),
+            poles=self._flat(weights.rate),
+            known=self._flat(self._of.known.astype(np.complex128))[: self.modes],
         )
+
+    def _bare(self) -> NDArray[np.bool_]:
+        """Which of its interfaces have no element but the linear ones, (interfaces,)."""
+        acted_on = [seat.x for seat in self._plant.bearings] + [seat.y for seat in self._plant.bearings]
+        return ~np.isin(self._own, acted_on)
+
+    def bare_springs(self) -> list[tuple[int, float]]:
+        """Interfaces of the system with nothing but linear elements, and the stiffness of each."""
+        carrier = self._plant.carrier
+        if carrier is None:
+            return []
+        bare = self._bare()
+        values = carrier.stiffness_n_per_m[bare]
+        return list(zip(self._own[bare].tolist(), values.tolist(), strict=True))
 
     def _flat(self, values: NDArray[np.complex128]) -> Array:
         """Complex numbers of the modes as real parts, then imaginary parts, both padded."""
@@ -115,7 +140,16 @@ class Carrying:
         still = np.zeros((self._dofs.size, of_internals.rigid_modes.shape[1]))
         return replace(of_internals, rigid_modes=np.vstack([of_internals.rigid_modes, still]))
 
-    def rest_forces(self, x: Array, forces: Array) -> Array:
+    def _seen(self, values: Array, phases: Array, sense: float) -> Array:
+        """Numbers of its interfaces, pairs turned: sense -1 into the axes of what it carries, 1 back."""
+        carrier, result = self._plant.carrier, values.copy()
+        assert carrier is not None
+        for pair in carrier.turning:
+            turn = turn_matrix(sense * 2 * math.pi * float(phases[pair.track]))
+            result[pair.both] = turn @ values[pair.both]
+        return result
+
+    def rest_forces(self, x: Array, forces: Array, phases: Array) -> Array:
         """Forces of the interfaces on the machine, whose bearings stand on the ground in its matrices.
 
         Parameters
@@ -124,27 +158,32 @@ class Carrying:
             Static displacements of the whole system.
         forces : ndarray, shape (interfaces,)
             What elements do beyond their linear parts.
+        phases : ndarray, shape (tracks,)
+            Angles of all tracks [turns].
         """
         if self._plant.carrier is None:
             return forces
         result = forces.copy()
-        result[self._own] += self._plant.carrier.stiffness_n_per_m * (self._of.shapes @ x[self._dofs])
+        seen = self._seen(self._of.shapes @ x[self._dofs], phases, -1.0)
+        result[self._own] += self._plant.carrier.stiffness_n_per_m * seen
         return result
 
-    def at_rest(self, x: Array, forces: Array) -> Array:
+    def at_rest(self, x: Array, forces: Array, phases: Array) -> Array:
         """The state for the loop at static equilibrium; arguments as of `rest_forces`."""
         carrier = self._plant.carrier
         if carrier is None:
             return np.zeros(0)
-        between = self._plant.system.interfaces.T @ x
-        position = x[self._dofs]
-        push = carrier.stiffness_n_per_m * between[self._own] - forces[self._own]
-        carried = between[self._own] + self._of.shapes @ position
-        return pack_carrier_state(self._of, self._step_s, position, push, carried)
+        own = self._of.shapes @ x[self._dofs]
+        carried = (self._plant.system.interfaces.T @ x)[self._own] + own
+        seen = self._seen(own, phases, -1.0)
+        push = carrier.stiffness_n_per_m * (carried - seen) - forces[self._own]
+        push = self._seen(push, phases, 1.0)
+        return pack_carrier_state(self._of, self._step_s, x[self._dofs], push, seen, carried)
 
 
-def needed_sites(plant: Plant, looked_at: Sequence[str]) -> Mapping[str, Vector | RotatingSite]:
+def needed_sites(plant: Plant, looked_at: Sequence[str] | None = None) -> Mapping[str, Vector | RotatingSite]:
     """All sites of a plant, or in a flexible casing those that are looked at, if it has them all."""
-    if plant.carrier is None or not looked_at or not set(looked_at) <= set(plant.sites):
+    if plant.carrier is None or looked_at is None or not set(looked_at) <= set(plant.sites):
         return plant.sites
-    return {name: site for name, site in plant.sites.items() if name in looked_at}
+    wanted = looked_at or tuple(plant.sites)[:1]  # an engine puts out one at least
+    return {name: site for name, site in plant.sites.items() if name in wanted}

@@ -98,8 +98,10 @@ class Engine:
         Whether the bearings' forces on a flexible casing are put out, those of dampers included.
     operation : Operation, optional
         Operating profile, ripple and added structure; without it speed and load change by events only.
-    looked_at : sequence of str
-        Sites that matter; in a flexible casing, where each takes time, no others are put out.
+    looked_at : sequence of str, optional
+        Sites that matter; in a flexible casing, where each takes time, no others are put out (if none, one).
+    settling : bool
+        Whether samples begin at rest, before sample 0; see `next_sample`.
 
     Raises
     ------
@@ -121,7 +123,8 @@ class Engine:
         probes: Sequence[str] = (),
         forces: bool = False,
         operation: Operation | None = None,
-        looked_at: Sequence[str] = (),
+        looked_at: Sequence[str] | None = None,
+        settling: bool = False,
     ) -> None:
         check_numbers(seed, sample_rate_hz, oversampling)
         self.params = params
@@ -145,7 +148,7 @@ class Engine:
                 raise InputError("engine", "probes", name, "one of " + ", ".join(self._probe_names))
         self._forces = forces
         self._prepare(seed, speed_hz, load_nm, faults)
-        self._settle()
+        self._settle(1 - int(SETTLING_S * sample_rate_hz) if settling else 0)
         self.warm_up()
 
     def _prepare(
@@ -164,18 +167,18 @@ class Engine:
         columns = (2 * HALF_LENGTH_SAMPLES + _BLOCK_SAMPLES) * self._steps + self._taps.size
         self._accel = np.zeros((self._stepper.row_count, columns))
 
-    def _settle(self) -> None:
-        """Run up to the step before the one where the filter of sample 0 begins."""
+    def _settle(self, first: int) -> None:
+        """Run up to the step before the one where the filter of the first sample to be put out begins."""
         self._motions: list[Motion] = []
-        self._next = 0
-        last = -HALF_LENGTH_SAMPLES * self._steps - 1
+        self._next = first
+        last = (first - HALF_LENGTH_SAMPLES) * self._steps - 1
         while True:
             self._base_step = self._stepper.step + 1  # step of column 0
             if self._stepper.step >= last:
                 break
             self._integrate(min(last, self._stepper.step + _BLOCK_SAMPLES * self._steps))
         self._motions.clear()
-        self._motion_sample = -HALF_LENGTH_SAMPLES
+        self._motion_sample = first - HALF_LENGTH_SAMPLES
 
     @property
     def site_names(self) -> tuple[str, ...]:

@@ -86,6 +86,12 @@ def _planetary(scenario: Scenario) -> Any:
     return load_planetary_params(scenario.machine_path, scenario.parameters, scenario.source)
 
 
+def _planetary_in_casing(scenario: Scenario) -> Any:
+    from gearsim_sim.params.planetary_casing import load_planetary_casing_params
+
+    return load_planetary_casing_params(scenario.machine_path, scenario.parameters, scenario.source)
+
+
 def _bearing_rig(scenario: Scenario, *, dofs: Literal[2, 4, 5]) -> Any:
     from gearsim_sim.params.bearing_rig import load_bearing_rig_params
 
@@ -102,6 +108,7 @@ _PARAMETERS: Mapping[str, Callable[[Scenario], Any]] = {
     "planetary18": _planetary,
     "cb146": partial(_in_casing, finite=False),
     "cb182": partial(_in_casing, finite=True),
+    "planetary_cb": _planetary_in_casing,
 }
 
 

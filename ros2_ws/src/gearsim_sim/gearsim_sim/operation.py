@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
 from gearsim_io.errors import InputError
 from gearsim_io.places import entry
 from gearsim_sim.model.assembly import Vector
@@ -16,7 +14,7 @@ from gearsim_sim.model.faults.on_site import hangable_sites, paired, site_direct
 from gearsim_sim.model.plant import LOAD, MOTOR, Plant, Track
 from gearsim_sim.model.rotating_force import TIME_TRACK, RotatingForce
 from gearsim_sim.model.side_oscillator import SideOscillator
-from gearsim_sim.model.structure import StructureModel, joined_parts, with_oscillators
+from gearsim_sim.model.structure import StructureModel, hung
 from gearsim_sim.profile.build import DriveLimits, Wanted, build_profile, read_trace
 from gearsim_sim.profile.profile import Profile, load_ratio
 from gearsim_sim.profile.settings import ProfileModel, RippleModel
@@ -44,11 +42,7 @@ class Operation:
         """
         added = self._oscillators(plant)
         if added:
-            system = with_oscillators(plant.system, added)
-            joined = joined_parts(plant.parts, {name: one.directions for name, one in added.items()})
-            parts = tuple(tuple(dof for dof in system.dof_names if dof in part) for part in joined)
-            rigid = np.concatenate([plant.rigid, np.zeros(len(added))])
-            plant = replace(plant, system=system, parts=parts, rigid=rigid)
+            plant = hung(plant, added)
         return replace(plant, tracks=(*plant.tracks, *_ripple_tracks(plant, self.profile.ripple)))
 
     def _oscillators(self, plant: Plant) -> dict[str, SideOscillator]:
@@ -71,8 +65,6 @@ class Operation:
 
     def _directions(self, plant: Plant, site: str, field: str) -> tuple[Vector, ...]:
         known = hangable_sites(plant)
-        if not known:
-            raise InputError(self.where, field, site, "no added structure: the casing has modes of its own")
         if site not in known:
             raise InputError(self.where, field, site, "one of " + ", ".join(known))
         return site_directions(plant, site)

@@ -122,12 +122,18 @@ class Stepper:
         carried = (self._carrying.modes, self._carrying.interfaces)
         self._loops = [make_loop(*sizes, shape[1], rates, side, *carried) for rates, side in kinds]
         self.row_count = len(vectors) + self._carrying.data.force_index.size
-        self._side = SideState(inner, [_side_part(part) for part in parts], self.row_count, schedule.step_s)
+        self._side = SideState(
+            inner,
+            [_side_part(part) for part in parts],
+            self._carrying.side,
+            self.row_count,
+            schedule.step_s,
+        )
         self._node_order = node_order(plant)
         self._memory = bearing_memory(self._data.bearings)
         self._state = self._at_rest()
         phases, speed_hz = plant.phases(schedule.turns(self.step)), schedule.segment.speed_hz(self.step)
-        self._side.start(schedule.side_rows(), self._state[:2], phases, self.step, speed_hz)
+        self._side.start(schedule.side_rows(), self._state, phases, self.step, speed_hz)
 
     @property
     def parts(self) -> tuple[PartSetup, ...]:
@@ -154,11 +160,11 @@ class Stepper:
 
     def rest(self) -> Rest:
         """Static equilibrium under the load at the present step, with the faults of that step."""
-        plant, schedule = self._plant, self._schedule
+        schedule = self._schedule
+        turns = schedule.turns(self.step)
+        plant = self._plant.standing(turns)
         system = plant.system
-        moment = Moment(
-            schedule.turns(self.step), schedule.segment.speed_hz(self.step), schedule.contributions(self.step)
-        )
+        moment = Moment(turns, schedule.segment.speed_hz(self.step), schedule.contributions(self.step))
         u = plant.known_inputs(schedule.segment.load_nm(self.step))
         rest = static_equilibrium(
             plant, self._carrying.all_modes(complex_modes(plant.internals.system)), moment, u
@@ -170,7 +176,8 @@ class Stepper:
         """State of both parts, and of the structure that carries them, at static equilibrium."""
         rest = self.rest()
         system, states = self._plant.system, []
-        forces = self._carrying.rest_forces(rest.x, rest.forces)
+        phases = self._plant.phases(self._schedule.turns(self.step))
+        forces = self._carrying.rest_forces(rest.x, rest.forces, phases)
         for setup in self._parts:
             if setup.propagator is None:
                 states.append(np.zeros(0))
@@ -179,7 +186,7 @@ class Stepper:
             z = setup.propagator.modal(own, np.zeros_like(own))
             known = rest.inputs @ setup.part.left_known
             states.append(pack_state(setup.propagator, z, known, forces[setup.interfaces]))
-        return states[0], states[1], self._carrying.at_rest(rest.x, rest.forces)
+        return states[0], states[1], self._carrying.at_rest(rest.x, rest.forces, phases)
 
     def compile_all(self) -> None:
         """Compile every variant of the loop (or load it), so that no fault on the way has to wait for it."""
@@ -201,7 +208,7 @@ class Stepper:
         schedule = self._schedule
         drive = schedule.drive()
         fluctuates = schedule.profile.fluctuation_nm is not None
-        return drive, self._side.update(schedule.side_rows(), self._state[:2], fluctuates=fluctuates)
+        return drive, self._side.update(schedule.side_rows(), self._state, fluctuates=fluctuates)
 
     def _run(
         self,
@@ -261,6 +268,8 @@ class Stepper:
         for mesh in self._plant.meshes:
             stiffness[mesh.interface] = mesh.mean_stiffness_n_per_m
             damping[mesh.interface] = mesh.damping_ns_per_m
+        for index, value in self._carrying.bare_springs():
+            stiffness[index] = value
         return np.asarray(stiffness * displacements + damping * rates - deviations)
 
 

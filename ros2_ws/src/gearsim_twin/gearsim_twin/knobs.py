@@ -73,6 +73,7 @@ KNOBS: dict[str, tuple[Knob, ...]] = {
     "cb146": _GEARBOX,
     "cb182": _GEARBOX,
     "planetary18": _PLANETARY,
+    "planetary_cb": _PLANETARY[:-1],
     "bearing2": _RIG,
     "bearing4": (*_RIG, *_PEDESTAL[:3]),
     "bearing5": (*_RIG, *_PEDESTAL),

@@ -14,14 +14,16 @@ lambda, and q = Im(z) / w_d. Three things make a step several times cheaper than
 - accelerations are worked out once for each mode, so that a site costs one product more.
 
 The loop calls `carrier_motion`, then its force functions, then `carry_forces`, `carrier_accelerations` and
-`carrier_advance`. Sizes `nc` (modes, a multiple of LANES) and `ni` (interfaces) are compile-time constants;
+`carrier_advance`. What the structure carries may turn against it: then forces and motions of a pair of its
+interfaces are turned on their way, see `model.carrier`. Sizes `nc` (modes, a multiple of LANES) and `ni` (interfaces) are compile-time constants;
 the number of sites may vary. Layout, in units of doubles (modes are padded with zeros):
 
     k: E 2nc | r 2nc | Im d_1 nc | Im d_2 nc | acceleration of z 2nc, of d_1 and d_2 2nc
        | shapes ni nc | shapes of sites ns nc
        | within a step: motion per force ni ni, by known forces ni, sites per force ns ni, by known forces ns
     s: E w 2nc | f now and before 2nc | known f nc | q without new forces nc | the same of q'' nc
-       | now: forces ni, motion ni, damper against the frame ni | motion without new forces ni
+       | now: forces ni, motion ni (seen from what it carries), damper against the frame ni
+       | motion without new forces ni
        | forces, the last three 3 ni | motion of the structure, the last four 4 ni | of what it carries 4 ni
        | work space ni | accelerations ns
 """
@@ -36,6 +38,7 @@ from numpy.typing import NDArray
 from gearsim_sim.integrate.coefficients import cubic_weights, padded
 from gearsim_sim.integrate.compiled import inlined
 from gearsim_sim.integrate.kernel import times_state
+from gearsim_sim.integrate.pieces import cosine_sine
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -59,6 +62,8 @@ class Carrier(NamedTuple):
 
     k: Array
     places: Indices  # (ni,) interface of the loop that each of its own is
+    bare: Indices  # interfaces of the loop among them at which no element acts but the linear ones
+    turning: Indices  # (pairs, 2) turning pairs: place of x among its own interfaces, track
     numbers: Array  # (2, ni) linear stiffness and damping of the elements there
     site_index: Indices  # (ns,) output row that each site adds to
     force_index: Indices  # (ni,) output row of the force on the structure, or none at all
@@ -66,13 +71,16 @@ class Carrier(NamedTuple):
     state_rows: Array  # (rows, 2 nc) outputs of q and q' at the output samples
     state_weights: Array  # (6 nc,) c_0, d_1, d_2 that these need, real parts, then imaginary parts
     poles: Array  # (2 nc,)
+    known: Array  # (nc,) constant modal forces
 
 
 def nothing_carried() -> Carrier:
     """That of a machine on the ground."""
     none = np.zeros(0, dtype=np.int64)
     empty = np.zeros(0)
-    return Carrier(empty, none, np.zeros((2, 0)), none, none, 0.0, np.zeros((0, 0)), empty, empty)
+    pairs = np.zeros((0, 2), dtype=np.int64)
+    numbers, rows = np.zeros((2, 0)), np.zeros((0, 0))
+    return Carrier(empty, none, none, pairs, numbers, none, none, 0.0, rows, empty, empty, empty)
 
 
 class Weights(NamedTuple):
@@ -117,7 +125,7 @@ def pack_carrier(of: Oscillators, step_s: float) -> Array:
 
 
 def pack_carrier_state(
-    of: Oscillators, step_s: float, position: Array, forces: Array, carried: Array
+    of: Oscillators, step_s: float, position: Array, forces: Array, seen: Array, carried: Array
 ) -> Array:
     """The array `s` for a start from rest.
 
@@ -127,6 +135,8 @@ def pack_carrier_state(
         Modal coordinates.
     forces : ndarray, shape (interfaces,)
         On the structure, as they have been for long.
+    seen : ndarray, shape (interfaces,)
+        Motion of the structure in the axes of what it carries.
     carried : ndarray, shape (interfaces,)
         Motion of what it carries.
     """
@@ -138,15 +148,28 @@ def pack_carrier_state(
     moved = (w.rate**2 * ahead).imag
     rows = np.zeros((_STATE_ROWS, modes))
     rows[:, : of.omega.size] = [rest.real, rest.imag, force, force, of.known, ahead.imag, moved]
-    own = of.shapes @ position
-    parts = [rows, forces, own, np.zeros_like(own), of.shapes @ ahead.imag]
-    parts += [np.tile(forces, 3), np.tile(own, 4), np.tile(carried, 4), np.zeros_like(own)]
+    parts = [rows, forces, seen, np.zeros_like(seen), of.shapes @ ahead.imag]
+    parts += [np.tile(forces, 3), np.tile(seen, 4), np.tile(carried, 4), np.zeros_like(seen)]
     parts.append(of.sites @ moved)
     return np.concatenate([np.ravel(one) for one in parts])
 
 
 @inlined
-def carrier_motion(s: Array, carrier: Carrier, q: Array, nc: int, ni: int) -> None:
+def turn(s: Array, at: int, carrier: Carrier, phases: Array, circle: Array, sense: float) -> None:
+    """Turn the pairs among the interfaces' numbers s[at:]: sense 1 into the axes of the structure, -1 back."""
+    for j in range(carrier.turning.shape[0]):
+        x = at + carrier.turning[j, 0]
+        c, sine = cosine_sine(phases[carrier.turning[j, 1]], circle)
+        own = sense * sine
+        first, second = s[x], s[x + 1]
+        s[x] = c * first - own * second
+        s[x + 1] = own * first + c * second
+
+
+@inlined
+def carrier_motion(
+    s: Array, carrier: Carrier, q: Array, forces: Array, phases: Array, circle: Array, nc: int, ni: int
+) -> None:
     """Take the motion of the structure from that of the interfaces, q, with extrapolated forces."""
     k = carrier.k
     comp = (_CONSTANT_ROWS + ni + (carrier.site_index.size & 0xFFFF)) * nc
@@ -159,8 +182,11 @@ def carrier_motion(s: Array, carrier: Carrier, q: Array, nc: int, ni: int) -> No
         guess = s[now + j]
         for i in range(ni):
             s[now + ni + i] += k[comp + j * ni + i] * guess
+    turn(s, now + ni, carrier, phases, circle, -1.0)
     for i in range(ni):
         q[carrier.places[i]] -= s[now + ni + i]
+    for i in range(carrier.bare.size):
+        forces[carrier.bare[i]] = 0.0
 
 
 @inlined
@@ -177,7 +203,9 @@ def slope(s: Array, past: int, newest: float, i: int, ni: int, per_slope: float)
 
 
 @inlined
-def carry_forces(s: Array, carrier: Carrier, q: Array, forces: Array, nc: int, ni: int) -> None:
+def carry_forces(
+    s: Array, carrier: Carrier, q: Array, forces: Array, phases: Array, circle: Array, nc: int, ni: int
+) -> None:
     """Forces on the structure; and to `forces` of what it carries, how its motion changes them.
 
     What it carries has the linear part of the elements between the two in its own equations, against the
@@ -201,10 +229,11 @@ def carry_forces(s: Array, carrier: Carrier, q: Array, forces: Array, nc: int, n
         s[bent + i] = deviation + stiffness * p + own
         s[now + i] = total
         s[now + 2 * ni + i] = own
+    turn(s, now, carrier, phases, circle, 1.0)
+    for i in range(ni):
         s[g + 2 * ni + i] = s[g + ni + i]
         s[g + ni + i] = s[g + i]
-        s[g + i] = total
-    for i in range(ni):
+        s[g + i] = s[now + i]
         forces[carrier.places[i]] = s[bent + i]
 
 
@@ -227,7 +256,7 @@ def carrier_accelerations(s: Array, carrier: Carrier, accel: Array, column: int,
 
 @inlined
 def enter_forces(s: Array, k: Array, nc: int, ni: int) -> None:
-    """Forces on the modes into s[5 nc:], four interfaces at a time; `ni` is a multiple of two."""
+    """Forces on the modes into s[5 nc:], four interfaces at a time."""
     now = _STATE_ROWS * nc
     for m in range(nc):
         s[5 * nc + m] = s[4 * nc + m]
@@ -239,11 +268,16 @@ def enter_forces(s: Array, k: Array, nc: int, ni: int) -> None:
             s[5 * nc + m] += (k[r + m] * g0 + k[r + nc + m] * g1) + (
                 k[r + 2 * nc + m] * g2 + k[r + 3 * nc + m] * g3
             )
-    for i in range(ni // 4 * 4, ni, 2):
+    for i in range(ni // 4 * 4, ni - 1, 2):
         r = (_CONSTANT_ROWS + i) * nc
         g0, g1 = s[now + i], s[now + i + 1]
         for m in range(nc):
             s[5 * nc + m] += k[r + m] * g0 + k[r + nc + m] * g1
+    for i in range(ni // 2 * 2, ni):
+        r = (_CONSTANT_ROWS + i) * nc
+        g0 = s[now + i]
+        for m in range(nc):
+            s[5 * nc + m] += k[r + m] * g0
 
 
 @inlined
@@ -271,6 +305,35 @@ def carrier_advance(s: Array, carrier: Carrier, length: int, nc: int, ni: int) -
 
 
 @inlined
+def free_motion(nc: int, ni: int) -> int:
+    """Where in `s` the motion at the interfaces without new forces begins."""
+    at: int = _STATE_ROWS * nc + 3 * ni
+    return at
+
+
+@inlined
+def known_forces_at(nc: int) -> int:
+    """Where in `s` the known forces on the modes begin."""
+    at: int = 4 * nc
+    return at
+
+
+@inlined
+def structure_force(s: Array, i: int, nc: int) -> float:
+    """The new force on the structure at an interface."""
+    force: float = s[_STATE_ROWS * nc + i]
+    return force
+
+
+@inlined
+def mode_without_force(s: Array, w: Array, m: int, nc: int) -> tuple[float, float]:
+    """Real and imaginary part of a mode's z without its new force, before `carrier_advance`."""
+    zr = s[m] + w[nc + m] * s[2 * nc + m] + w[2 * nc + m] * s[3 * nc + m]
+    zi = s[nc + m] + w[4 * nc + m] * s[2 * nc + m] + w[5 * nc + m] * s[3 * nc + m]
+    return zr, zi
+
+
+@inlined
 def ring_motion(s: Array, i: int, nc: int, ni: int) -> float:
     """Motion of the structure at an interface."""
     motion: float = s[_STATE_ROWS * nc + ni + i]
@@ -293,8 +356,9 @@ def carrier_state(s: Array, carrier: Carrier, row: int, nc: int, ni: int) -> flo
         f = s[4 * nc + m]
         for i in range(ni):
             f += k[(_CONSTANT_ROWS + i) * nc + m] * s[_STATE_ROWS * nc + i]
-        zr = s[m] + w[m] * f + w[nc + m] * s[2 * nc + m] + w[2 * nc + m] * s[3 * nc + m]
-        zi = s[nc + m] + w[3 * nc + m] * f + w[4 * nc + m] * s[2 * nc + m] + w[5 * nc + m] * s[3 * nc + m]
+        zr, zi = mode_without_force(s, w, m, nc)
+        zr += w[m] * f
+        zi += w[3 * nc + m] * f
         rate = carrier.poles[m] * zi + carrier.poles[nc + m] * zr
         total += carrier.state_rows[row, m] * zi + carrier.state_rows[row, nc + m] * rate
     return total

@@ -9,6 +9,13 @@ from __future__ import annotations
 
 import math
 
+from gearsim_sim.integrate.carrier_kernel import (
+    Carrier,
+    free_motion,
+    known_forces_at,
+    mode_without_force,
+    structure_force,
+)
 from gearsim_sim.integrate.compiled import apart, inlined
 from gearsim_sim.integrate.pieces import ramp
 from gearsim_sim.model.loop_data import SEVERITY_COLUMNS, Array
@@ -66,11 +73,16 @@ def foot_force(row: Array, step: int, y: float, rate: float) -> float:
 
 
 @apart
-def guess_forces(side: Side, q: Array, rates: Array) -> None:
-    """Extrapolated forces of feet and oscillators into `Side.now`, and what they do to the interfaces."""
+def guess_forces(side: Side, q: Array, rates: Array, sc: Array, nc: int, ic: int) -> None:
+    """Extrapolated forces of feet and oscillators into `Side.now`, and what they do to the interfaces.
+
+    `sc`, of a structure of `nc` modes and `ic` interfaces, is empty if bearings stand on the ground.
+    """
     now = side.now
     for d in range(now.shape[1]):
         now[FORCE, d] = 0.0
+        now[PLACE, d] = 0.0
+        now[RATE, d] = 0.0
     feet = side.feet.shape[0]
     for j in range(feet):
         now[FORCE, int(side.feet[j, _FOOT])] += extrapolated(side.state[j], 0)
@@ -85,6 +97,8 @@ def guess_forces(side: Side, q: Array, rates: Array) -> None:
             for i in range(q.size):
                 q[i] += side.motions[d, i] * force
                 rates[i] += side.motions[d, q.size + i] * force
+            for i in range(ic):
+                sc[free_motion(nc, ic) + i] += side.structure_motions[d, i] * force
 
 
 @inlined
@@ -99,6 +113,37 @@ def places(side: Side, s: Array, start: int, n2: int) -> None:
             rate += side.rate_rows[d, start + m] * predicted
         side.now[PLACE, d] += place
         side.now[RATE, d] += rate
+
+
+@apart
+def carried_places(side: Side, s: Array, carrier: Carrier, nc: int, ni: int) -> None:
+    """What the predicted modes of a structure and the forces on it say of the directions; goes first."""
+    now, w = side.now, carrier.state_weights
+    for d in range(now.shape[1]):
+        place, rate = side.structure_known[0, d], side.structure_known[1, d]
+        for i in range(ni):
+            force = structure_force(s, i, nc)
+            place += side.structure_motions[d, i] * force
+            rate += side.structure_rates[d, i] * force
+        for m in range(nc):
+            zr, zi = mode_without_force(s, w, m, nc)
+            place += side.structure_rows[d, m] * zi
+            rate += side.structure_rows[d, m] * (carrier.poles[m] * zi + carrier.poles[nc + m] * zr)
+        now[PLACE, d] = place
+        now[RATE, d] = rate
+
+
+@apart
+def push_carried(side: Side, s: Array, carrier: Carrier, nc: int) -> None:
+    """The new forces of `Side.now` into the known forces on the modes of a structure."""
+    known = known_forces_at(nc)
+    for m in range(nc):
+        s[known + m] = carrier.known[m]
+    for d in range(side.now.shape[1]):
+        force = side.now[FORCE, d]
+        if force != 0.0:
+            for m in range(nc):
+                s[known + m] += side.structure_rows[d, m] * force
 
 
 @inlined
@@ -167,11 +212,12 @@ def advance_oscillator(side: Side, j: int, step: int) -> None:
 def joint_forces(
     step: int, side: Side, forces: Array, s0: Array, s1: Array, n0: int, n1: int, accel: Array, column: int
 ) -> None:
-    """New forces of feet and oscillators, and what they do to modes and sites; n0, n1: 2 nm of the parts."""
+    """New forces of feet and oscillators, and what they do to modes and sites; n0, n1: 2 nm of the parts.
+
+    `Side.now` has what a carrying structure says of the directions (`carried_places`), else zeros.
+    """
     now = side.now
     for d in range(now.shape[1]):
-        now[PLACE, d] = 0.0
-        now[RATE, d] = 0.0
         for i in range(forces.size):
             now[PLACE, d] += side.back[d, i] * forces[i]
             now[RATE, d] += side.back_rate[d, i] * forces[i]

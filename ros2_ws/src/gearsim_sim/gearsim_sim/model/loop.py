@@ -37,7 +37,7 @@ from gearsim_sim.integrate.pieces import cosine_sine
 from gearsim_sim.model.bearing_fault_loop import JUMP_COLUMNS, NOW_COLUMNS, rest_terms
 from gearsim_sim.model.bearing_loop import bearing_forces
 from gearsim_sim.model.forcing_loop import apply_known, known_inputs, reference_motion
-from gearsim_sim.model.joint_loop import guess_forces, joint_forces
+from gearsim_sim.model.joint_loop import carried_places, guess_forces, joint_forces, push_carried
 from gearsim_sim.model.known_loop import ANGLE, SPEED, known_forces
 from gearsim_sim.model.loop_data import Array, BearingMemory, Data, Drive, Part
 from gearsim_sim.model.mesh_loop import WORK_ROWS, look_up, mesh_forces
@@ -217,9 +217,9 @@ def make_loop(
                 for j in range(rated * i1):
                     rates[i0 + j] = s1[q1 + i1 + j]
                 for _ in range(sided):
-                    guess_forces(side, q, rates)
+                    guess_forces(side, q, rates, sc, nc, ic)
                 for _ in range(carried):
-                    carrier_motion(sc, data.carrier, q, nc, ic)
+                    carrier_motion(sc, data.carrier, q, forces, phases, data.circle, nc, ic)
                 bearing_forces(
                     step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
                     data.step_s, balls,
@@ -230,7 +230,7 @@ def make_loop(
                     between_nodes(step - before, stride, data.step_s, nodes, meshes)
                 mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
                 for _ in range(carried):
-                    carry_forces(sc, data.carrier, q, forces, nc, ic)
+                    carry_forces(sc, data.carrier, q, forces, phases, data.circle, nc, ic)
                 remember_forces(s0, forces, 0, n0, i0)
                 remember_forces(s1, forces, i0, n1, i1)
                 for j in range(accel.shape[0]):
@@ -251,7 +251,11 @@ def make_loop(
                 for _ in range(sided):
                     correct(s0, data.first.k, forces, 0, n0, i0)
                     correct(s1, data.second.k, forces, i0, n1, i1)
+                    for _ in range(carried):
+                        carried_places(side, sc, data.carrier, nc, ic)
                     joint_forces(step, side, forces, s0, s1, 2 * n0, 2 * n1, accel, column + i)
+                    for _ in range(carried):
+                        push_carried(side, sc, data.carrier, nc)
                     predict(s0, data.first.k, n0)
                     predict(s1, data.second.k, n1)
                 rotate_sites(phases, data, accel, column + i)

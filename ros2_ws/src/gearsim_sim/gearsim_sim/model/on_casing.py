@@ -16,16 +16,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_sim.model.assembly import Elements, LinearSystem, Vector
-from gearsim_sim.model.carrier import CarryingStructure
+from gearsim_sim.model.carrier import CarryingStructure, TurningPair
 from gearsim_sim.model.casing.reduced import ReducedCasing, Site
 from gearsim_sim.model.plant import GRAVITY, Plant
+from gearsim_sim.model.shafts import Mount
 
 Array = NDArray[np.float64]
 _AXES = {"x": "ux", "y": "uy"}
@@ -35,16 +36,48 @@ _MODAL = 1e-4
 _LEAST_HZ = 0.5  # slower than that a casing is not held by its mounts
 
 
-def on_casing(plant: Plant, casing: ReducedCasing, where: str, *, gravity: bool = True) -> Plant:
+@dataclass(frozen=True)
+class Joint:
+    """An interface of a machine on the ground that goes to a displacement of a master of the casing."""
+
+    interface: int
+    master: str
+    direction: str
+    what: str  # that stands there, for errors
+
+
+def bearing_joints(plant: Plant) -> tuple[Joint, ...]:
+    """The n-th bearing goes into master `b<n>`, without moments."""
+    found = (
+        Joint(getattr(seat, axis), f"b{number}", direction, seat.name)
+        for number, seat in enumerate(plant.bearings, 1)
+        for axis, direction in _AXES.items()
+    )
+    return tuple(sorted(found, key=lambda joint: joint.interface))
+
+
+def on_casing(
+    plant: Plant,
+    casing: ReducedCasing,
+    where: str,
+    *,
+    joints: Sequence[Joint] | None = None,
+    turning: tuple[TurningPair, ...] = (),
+    gravity: bool = True,
+) -> Plant:
     """The machine in that casing.
 
     Parameters
     ----------
     plant : Plant
-        On the ground; its n-th bearing goes into master `b<n>`.
+        On the ground.
     casing : ReducedCasing
     where : str
         Named in errors.
+    joints : sequence of Joint, optional
+        Those of its bearings, if not given.
+    turning : tuple of TurningPair
+        Joints (by their places) whose plane turns against the casing.
     gravity : bool
         Whether the casing has weight.
 
@@ -55,8 +88,9 @@ def on_casing(plant: Plant, casing: ReducedCasing, where: str, *, gravity: bool 
     """
     omega, ratios, shapes = own_modes(casing, where)
     dofs = tuple(f"casing_{number}" for number in range(1, omega.size + 1))
-    rings = _ring_rows(plant, casing, where) @ shapes  # (interfaces, modes)
-    carried = [index for index in range(len(rings)) if np.any(rings[index])]
+    joints = bearing_joints(plant) if joints is None else joints
+    rings = _ring_rows(plant, casing, joints, where) @ shapes  # (interfaces, modes)
+    carried = [joint.interface for joint in joints]
     system = plant.system
     stiffness, damping = (
         _between(system, elements, carried) for elements in (system.springs, system.dampers)
@@ -67,9 +101,13 @@ def on_casing(plant: Plant, casing: ReducedCasing, where: str, *, gravity: bool 
         plant,
         system=joined,
         rigid=np.concatenate([plant.rigid, np.zeros(len(dofs))]),
-        sites=_sites(plant, casing, dofs, rings, omega, shapes),
-        mounts={},
-        carrier=CarryingStructure(dofs, omega, ratios, tuple(carried), stiffness, damping),
+        sites=_sites(casing, joints, dofs, rings, omega, shapes),
+        # A foot's own damping is part of the modal damping: none of it is lost where the foot lifts.
+        mounts={
+            foot.name: Mount(_vector(dofs, foot.rows @ shapes), foot.stiffness_n_per_m, 0.0)
+            for foot in casing.feet
+        },
+        carrier=CarryingStructure(dofs, omega, ratios, tuple(carried), stiffness, damping, turning),
     )
 
 
@@ -101,15 +139,14 @@ def own_modes(casing: ReducedCasing, where: str) -> tuple[Array, Array, Array]:
     return omega, ratios, shapes
 
 
-def _ring_rows(plant: Plant, casing: ReducedCasing, where: str) -> Array:
+def _ring_rows(plant: Plant, casing: ReducedCasing, joints: Sequence[Joint], where: str) -> Array:
     """Motion of the ring of each interface over the coordinates of the casing, (interfaces, n)."""
     rows = np.zeros((len(plant.system.interface_names), casing.size))
-    for number, seat in enumerate(plant.bearings, 1):
-        if f"b{number}" not in casing.masters:
-            expected = f"a bore b{number} for {seat.name}"
+    for joint in joints:
+        if joint.master not in casing.masters:
+            expected = f"a bore {joint.master} for {joint.what}"
             raise InputError(where, "masters", ", ".join(casing.masters), expected)
-        rows[seat.x, casing.dof(f"b{number}", "ux")] = 1.0
-        rows[seat.y, casing.dof(f"b{number}", "uy")] = 1.0
+        rows[joint.interface, casing.dof(joint.master, joint.direction)] = 1.0
     return rows
 
 
@@ -166,13 +203,18 @@ def _matrix(elements: Elements) -> Array:
 
 
 def _sites(
-    plant: Plant, casing: ReducedCasing, dofs: tuple[str, ...], rings: Array, omega: Array, shapes: Array
+    casing: ReducedCasing,
+    joints: Sequence[Joint],
+    dofs: tuple[str, ...],
+    rings: Array,
+    omega: Array,
+    shapes: Array,
 ) -> Mapping[str, Vector]:
-    """Rings under the names of the machine's bearings (`b1_x`), then the casing's own sites."""
+    """Masters that carry something under their names (`b1_x`), then the casing's own sites."""
     found: dict[str, Vector] = {}
-    for number, seat in enumerate(plant.bearings, 1):
-        for axis in _AXES:
-            found[f"b{number}_{axis}"] = _vector(dofs, rings[getattr(seat, axis)])
+    for joint in joints:
+        if joint.direction in _AXES.values():
+            found[f"{joint.master}_{joint.direction[1]}"] = _vector(dofs, rings[joint.interface])
     for site in casing.sites:
         found[site.name] = _vector(dofs, site_row(site, casing, omega, shapes))
     return found

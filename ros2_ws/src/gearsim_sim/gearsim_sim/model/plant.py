@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gearsim_sim.model.assembly import LinearSystem, Vector
 from gearsim_sim.model.bearing_seat import BearingSeat
-from gearsim_sim.model.carrier import CarryingStructure, internals
+from gearsim_sim.model.carrier import CarryingStructure, PairForce, PairPlaces, internals, pair_places, turned
 from gearsim_sim.model.contributions import Contribution
 from gearsim_sim.model.gear_mesh import Mesh
 from gearsim_sim.model.gear_wheel import GearWheel
@@ -139,6 +139,39 @@ class Plant:
             self, system=internals(self.system, self.carrier), rigid=self.rigid[inside], carrier=None
         )
 
+    def standing(self, turns: float) -> Plant:
+        """The machine at an angle of the reference shaft, where it stands: nothing turns against a casing."""
+        if self.carrier is None or not self.carrier.turning:
+            return self
+        system = turned(self.system, self.carrier, self.phases(turns))
+        return replace(self, system=system, carrier=replace(self.carrier, turning=()))
+
+    @cached_property
+    def _pairs(self) -> tuple[PairPlaces, ...]:
+        return () if self.carrier is None else pair_places(self.system, self.carrier)
+
+    def turning_pairs(
+        self, x: Array, v: Array, moment: Moment
+    ) -> list[tuple[PairPlaces, PairForce, PairForce]]:
+        """Places that turn against the casing: forces now, and as the system has them, at the angle zero."""
+        phases = self.phases(moment.turns)
+        rates = 2 * math.pi * moment.speed_hz * self.rates
+        return [
+            (
+                pair,
+                pair.force(x, v, 2 * math.pi * float(phases[pair.track]), float(rates[pair.track])),
+                pair.force(x, v, 0.0, 0.0),
+            )
+            for pair in self._pairs
+        ]
+
+    def turning_force(self, x: Array, v: Array, moment: Moment) -> Array:
+        """On all degrees of freedom: what the turning of places adds to the linear system, (n,)."""
+        found = np.zeros(len(self.system.dof_names))
+        for pair, now, still in self.turning_pairs(x, v, moment):
+            found += pair.push(now) - pair.push(still)
+        return found
+
     @cached_property
     def rates(self) -> Array:
         """Turns of each track per turn of the reference shaft."""
@@ -206,6 +239,8 @@ class Plant:
             d = q[mesh.interface]
             energy += mesh.energy(d, phases, self._of(moment, "mesh", index))
             energy -= 0.5 * mesh.mean_stiffness_n_per_m * d**2
+        for _, now, still in self.turning_pairs(x, np.zeros_like(x), moment):
+            energy += now.energy_j - still.energy_j
         return float(energy)
 
     def static_interface(self, q: Array, moment: Moment) -> tuple[Array, Array]:
@@ -240,4 +275,5 @@ class Plant:
         system = self.system
         g = self.interface_forces(system.interfaces.T @ x, system.interfaces.T @ v, moment)
         force = system.interfaces @ g + system.inputs @ u - system.damping @ v - system.stiffness @ x
+        force += self.turning_force(x, v, moment)
         return np.asarray(force / np.diag(system.mass))

@@ -15,7 +15,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsim_sim.integrate.coefficients import Propagator, cubic_weights
+from gearsim_sim.integrate.carrier_kernel import Oscillators, Weights, oscillator_weights
+from gearsim_sim.integrate.coefficients import Propagator, cubic_weights, padded
 from gearsim_sim.model.assembly import LinearSystem, Vector
 
 Array = NDArray[np.float64]
@@ -74,6 +75,10 @@ class Side(NamedTuple):
     own: Array  # (directions, directions) displacement per newton
     own_rate: Array  # (directions, directions)
     rigid: Array  # (directions,) torque on the rigid rotation per newton
+    structure_rows: Array  # (directions, nc) displacement per mode of a carrying structure
+    structure_motions: Array  # (directions, ni) motion of the structure at its interfaces per newton
+    structure_rates: Array  # (directions, ni) rate per newton at the structure's interfaces
+    structure_known: Array  # (2, directions) displacement and rate by known forces within a step
     forcings: Array
     feet: Array
     oscillators: Array
@@ -111,18 +116,59 @@ class Directions:
     own: Array
     own_rate: Array
     rigid: Array
+    structure_rows: Array
+    structure_motions: Array
+    structure_rates: Array
+    structure_known: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SideStructure:
+    """The structure that carries the machine, as the loop has it; empty on the ground."""
+
+    dofs: tuple[str, ...]
+    of: Oscillators  # with the sites that are put out
+    site_index: NDArray[np.int64]
+    weights: Weights
+
+    def coordinates(self, state: Array) -> NDArray[np.complex128]:
+        """z of its modes in the loop's state between two steps, (modes,).
+
+        The force before the last two is not kept; going straight on from these it is wrong by its second
+        difference, and weighs little.
+        """
+        count, w = len(self.dofs), self.weights
+        size = padded(count)
+        if not count:
+            return np.zeros(0, dtype=np.complex128)
+        ahead = state[:count] + 1j * state[size : size + count]
+        now, before = state[2 * size : 2 * size + count], state[3 * size : 3 * size + count]
+        entered = (w.now - w.gain) * now
+        return np.asarray(ahead / w.decay + entered + w.before * before + w.earlier * (2 * before - now))
+
+
+def no_structure() -> SideStructure:
+    """That of a machine on the ground."""
+    none, rows = np.zeros(0), np.zeros((0, 0))
+    of = Oscillators(none, none, rows, rows, none)
+    return SideStructure((), of, np.zeros(0, dtype=np.int64), oscillator_weights(none, none, 1.0))
 
 
 def work_out(
     system: LinearSystem,
     rigid: Array,
     parts: Sequence[SidePart],
+    structure: SideStructure,
     directions: Sequence[Vector],
     site_rows: int,
 ) -> Directions:
-    """The arrays of `directions` in a machine with these parts."""
-    count = len(directions)
-    vectors = np.array([system.direction(one) for one in directions]).reshape(count, len(system.dof_names))
+    """The arrays of `directions` in a machine with these parts, and the structure that carries it."""
+    count, inside = len(directions), len(system.dof_names)
+    names = {name: i for i, name in enumerate((*system.dof_names, *structure.dofs))}
+    vectors = np.zeros((count, len(names)))
+    for row, direction in zip(vectors, directions, strict=True):
+        for name, value in direction.items():
+            row[names[name]] += value
     sizes = [2 * (part.propagator.modes if part.propagator is not None else 0) for part in parts]
     interfaces = sum(part.interfaces for part in parts)
     modal = {name: np.zeros((count, sum(sizes))) for name in ("step", "rows", "rate_rows")}
@@ -145,6 +191,11 @@ def work_out(
             own += found["own"]
             own_rate += found["own_rate"]
         first, mode = first + part.interfaces, mode + size
+    carried = _structure_response(structure, vectors[:, inside:])
+    for array in (known, full):
+        array[:, structure.site_index] += carried["sites"]
+    own += carried["own"]
+    own_rate += carried["own_rate"]
     return Directions(
         **modal,
         site_known=known,
@@ -154,8 +205,27 @@ def work_out(
         back_rate=back_rate,
         own=own,
         own_rate=own_rate,
-        rigid=vectors @ rigid,
+        rigid=vectors[:, :inside] @ rigid,
+        **{f"structure_{name}": carried[name] for name in ("rows", "motions", "rates", "known")},
     )
+
+
+def _structure_response(structure: SideStructure, vectors: Array) -> dict[str, Array]:
+    """The same of the structure: what newtons along `vectors` (directions, modes) do, and what moves them."""
+    of, rate, first = structure.of, structure.weights.rate, structure.weights.first
+    place, speed = vectors * first.imag, vectors * (rate * first).imag
+    push = vectors * ((rate**2 * first).imag + 1.0)
+    rows = np.zeros((len(vectors), padded(vectors.shape[1])))
+    rows[:, : vectors.shape[1]] = vectors
+    return {
+        "rows": rows,
+        "motions": place @ of.shapes.T,
+        "rates": speed @ of.shapes.T,
+        "known": np.array([place @ of.known, speed @ of.known]),
+        "sites": push @ of.sites.T,
+        "own": place @ vectors.T,
+        "own_rate": speed @ vectors.T,
+    }
 
 
 def _part_response(system: LinearSystem, part: SidePart, vectors: Array) -> dict[str, Array]:

@@ -24,6 +24,7 @@ from gearsim_sim.model.side_data import (
     Side,
     SidePart,
     SideRow,
+    SideStructure,
     drift_pole,
     drift_response,
     pole,
@@ -47,16 +48,26 @@ class SideState:
     Parameters
     ----------
     plant : Plant
+        Without the structure that carries it.
     parts : sequence of SidePart
         Those of the loop, in its order.
+    structure : SideStructure
     site_rows : int
         Rows of acceleration.
     step_s : float
     """
 
-    def __init__(self, plant: Plant, parts: Sequence[SidePart], site_rows: int, step_s: float) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        parts: Sequence[SidePart],
+        structure: SideStructure,
+        site_rows: int,
+        step_s: float,
+    ) -> None:
         self._plant = plant
         self._parts = tuple(parts)
+        self._structure = structure
         self._site_rows = site_rows
         self._step_s = step_s
         self._rows: tuple[SideRow, ...] | None = None
@@ -66,7 +77,9 @@ class SideState:
         self._drift = np.zeros(8)
         self._drift_pole = drift_pole(step_s)
         self._sizes = [2 * part.propagator.modes if part.propagator is not None else 0 for part in parts]
-        self._z = np.zeros(sum(self._sizes))  # mode coordinates of all parts when rows changed last
+        # Mode coordinates of all parts and of the structure when rows changed last.
+        self._z = np.zeros(sum(self._sizes))
+        self._structure_z = np.zeros(len(structure.dofs), dtype=np.complex128)
         self._kept: dict[tuple[int, int], Array] = {}
         # Once something turns the rigid rotation out of its course, it goes on swinging for a while.
         self._swings = False
@@ -77,12 +90,13 @@ class SideState:
         """As packed last."""
         return self._side
 
-    def update(self, rows: tuple[SideRow, ...], states: tuple[Array, Array], *, fluctuates: bool) -> Side:
-        """What the loop needs for these rows; `states` are those of the parts now."""
+    def update(self, rows: tuple[SideRow, ...], states: Sequence[Array], *, fluctuates: bool) -> Side:
+        """What the loop needs for these rows; `states` are those of the parts and of the structure now."""
         if fluctuates and not self._swings:
             self._swings, self._rows = True, None
         if rows != self._rows:
-            self._z = np.concatenate([state[:n2] for state, n2 in zip(states, self._sizes, strict=True)])
+            self._z = np.concatenate([state[:n2] for state, n2 in zip(states, self._sizes, strict=False)])
+            self._structure_z = self._structure.coordinates(states[-1])
             self._side = self._pack(rows)
             self._start_new(rows)
             self._rows = rows
@@ -131,7 +145,9 @@ class SideState:
     def _work_out(self) -> Directions:
         if self._found is None:
             plant = self._plant
-            self._found = work_out(plant.system, plant.rigid, self._parts, self._directions, self._site_rows)
+            self._found = work_out(
+                plant.system, plant.rigid, self._parts, self._structure, self._directions, self._site_rows
+            )
         return self._found
 
     def _turned_by(self, forcings: Array, found: Directions) -> bool:
@@ -163,12 +179,17 @@ class SideState:
 
     def _motion(self, direction: int) -> tuple[float, float]:
         """Displacement and rate of a direction now."""
-        return float(self._side.rows[direction] @ self._z), float(self._side.rate_rows[direction] @ self._z)
+        side, count = self._side, self._structure_z.size
+        place, rate = side.rows[direction] @ self._z, side.rate_rows[direction] @ self._z
+        row = side.structure_rows[direction, :count]
+        place += row @ self._structure_z.imag
+        rate += row @ (self._structure.weights.rate * self._structure_z).imag
+        return float(place), float(rate)
 
     def start(
         self,
         rows: tuple[SideRow, ...],
-        states: tuple[Array, Array],
+        states: Sequence[Array],
         phases: Array,
         step: int,
         speed_hz: float,
@@ -183,7 +204,8 @@ class SideState:
             if isinstance(row.contribution, SideOscillator):
                 now += self._hanging(row, state)
         place = 0
-        for part, n2, state in zip(self._parts, self._sizes, states, strict=True):
+        # What hangs on a structure at rest hangs still: it has no force yet that could have acted for long.
+        for part, n2, state in zip(self._parts, self._sizes, states, strict=False):
             if part.propagator is not None:
                 add_history(part.propagator, state, now @ side.step[:, place : place + n2])
             place += n2

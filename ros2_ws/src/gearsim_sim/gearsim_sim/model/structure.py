@@ -18,6 +18,7 @@ from pydantic import Field
 
 from gearsim_io.quantities import Si, Strict
 from gearsim_sim.model.assembly import LinearSystem, Vector
+from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.side_oscillator import SideOscillator
 
 Array = NDArray[np.float64]
@@ -87,14 +88,60 @@ def with_oscillators(system: LinearSystem, added: Mapping[str, SideOscillator]) 
     )
 
 
+def hung(plant: Plant, added: Mapping[str, SideOscillator]) -> Plant:
+    """The machine with further masses for good; each key names the degree of freedom of one.
+
+    Springs to places of a flexible casing are what its bearings are: interfaces that the casing carries.
+    """
+    system = with_oscillators(plant.system, added)
+    names = system.dof_names
+    joined = joined_parts(plant.parts, {name: one.directions for name, one in added.items()})
+    plant = replace(
+        plant,
+        system=system,
+        parts=tuple(tuple(dof for dof in names if dof in part) for part in joined),
+        rigid=np.concatenate([plant.rigid, np.zeros(len(added))]),
+    )
+    carrier = plant.carrier
+    if carrier is None:
+        return plant
+    labels, columns, numbers = [], [], []
+    for name, one in added.items():
+        share = one.mass_kg / len(one.directions)
+        for end, direction in enumerate(one.directions, 1):
+            if carrier.carries(direction):
+                labels.append(f"{name}_{end}")
+                columns.append(system.direction({name: 1.0}) - system.direction(direction))
+                numbers.append((share * one.omega**2, share * 2 * one.damping_ratio * one.omega))
+    first, new = len(system.interface_names), np.array(columns).reshape(-1, len(names)).T
+    values = np.array(numbers).reshape(-1, 2)
+    return replace(
+        plant,
+        system=replace(
+            system,
+            interface_names=(*system.interface_names, *labels),
+            interfaces=np.hstack([system.interfaces, new]),
+        ),
+        carrier=replace(
+            carrier,
+            interfaces=(*carrier.interfaces, *range(first, first + len(labels))),
+            stiffness_n_per_m=np.concatenate([carrier.stiffness_n_per_m, values[:, 0]]),
+            damping_ns_per_m=np.concatenate([carrier.damping_ns_per_m, values[:, 1]]),
+        ),
+    )
+
+
 def joined_parts(
     parts: Sequence[tuple[str, ...]], added: Mapping[str, Sequence[Vector]]
 ) -> tuple[tuple[str, ...], ...]:
-    """The independent parts when further degrees of freedom join some: each key hangs on its directions."""
+    """The independent parts when further degrees of freedom join some: each key hangs on its directions.
+
+    One that hangs on none of them, but on a casing, goes with the last one.
+    """
     groups = [list(part) for part in parts]
     for name, directions in added.items():
         touched = {dof for direction in directions for dof in direction}
-        together = [group for group in groups if touched & set(group)]
-        apart = [group for group in groups if not touched & set(group)]
+        together = [group for group in groups if touched & set(group)] or groups[-1:]
+        apart = [group for group in groups if group not in together]
         groups = [*apart, [dof for group in together for dof in group] + [name]]
     return tuple(tuple(group) for group in groups)

@@ -150,6 +150,17 @@ class Casing(Strict):
     """Damping between the sun shaft and that mass."""
 
 
+class FlexibleCasing(Strict):
+    """The flexible casing of the model with one: ring and sun stand in it by their supports."""
+
+    reduced: str
+    """Name of a shipped reduced casing, or path of one (.npz) from the folder of the file that names it."""
+    carrier_stiffness_n_per_m: Annotated[float, Si("N/m", ge=0), Field(alias="carrier_stiffness")]
+    """Stiffness of the carrier's bearing in the casing, in x and y; 0: it has none."""
+    carrier_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="carrier_damping")]
+    """Damping of that bearing."""
+
+
 class FirstStage(Strict):
     """The spur stage that drives the carrier."""
 
@@ -209,6 +220,7 @@ class PlanetaryModel(Strict):
     planet_bearing: PlanetBearing
     casing: Casing
     first_stage: FirstStage
+    flexible_casing: FlexibleCasing | None = None
 
 
 class PlanetaryParams(Strict):

@@ -31,8 +31,6 @@ LIMIT = 1e-3
 # order, and 1e-3 needs 8 steps per sample on the planetary stage.
 RATTLING = {"gear_backlash": 4e-3}
 HEALTHY = "healthy"
-# A fault of a bearing, whose force the casing feels, and one of the mesh.
-_IN_CASING = ("outer_race_spall", "gear_tooth_crack")
 _PEAK_S = 0.006  # where in the window the fault does most
 _BINS_S = 0.002
 _EVERY = 3  # step that is compared
@@ -60,13 +58,8 @@ class Accuracy:
 
 
 def kinds_on(model: str) -> tuple[str, ...]:
-    """HEALTHY, and the kinds of fault that a model can have.
-
-    In a flexible casing those of `_IN_CASING`: what faults touch there is the internals, the same as without.
-    """
+    """HEALTHY, and the kinds of fault that a model can have."""
     plant = plant_of(model)
-    if plant.carrier is not None:
-        return (HEALTHY, *_IN_CASING)
     return (HEALTHY, *(name for name, kind in REGISTRY.items() if kind.components(plant)))
 
 

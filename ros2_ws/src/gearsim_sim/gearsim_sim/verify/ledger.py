@@ -6,7 +6,8 @@ Kinetic energy is that of every mass. Elastic energy is that of every linear spr
 every pair of teeth. Dampers are taken one by one, each by its own
 elongation, not through the matrix: a damper without its reaction would not balance. What moves by
 prescription (balls and pits that pass, teeth that come and go, errors of the teeth, faults that grow) works
-by the change of elastic energy at standing displacements, and through the dampers of the meshes.
+by the change of elastic energy at standing displacements, and through the dampers of the meshes; so does
+the turning of a machine against its casing.
 
 None of it comes from the compiled loop but the states: forces and energies are those of the readable
 model. So the balance closes only if loop, matrices and readable elements mean the same machine.
@@ -118,7 +119,7 @@ def _elements(trajectory: Trajectory, steps: list[int]) -> tuple[Array, Array, A
 
 
 def _element_row(trajectory: Trajectory, step: int) -> tuple[float, float, float, float]:
-    """Energy of contacts beyond the linear springs, power of prescribed motion, and two of the teeth."""
+    """Energy of contacts beyond the linear springs, power of prescribed motion, and two of dampers."""
     plant = trajectory.plant
     x, v = trajectory.x[:, step], trajectory.v[:, step]
     moment = trajectory.moment(float(step))
@@ -126,7 +127,10 @@ def _element_row(trajectory: Trajectory, step: int) -> tuple[float, float, float
     before, after = (trajectory.moment(step + d) for d in (-_DIFFERENCE_STEPS, _DIFFERENCE_STEPS))
     change = plant.potential_energy(x, after) - plant.potential_energy(x, before)
     prescribed = change / (2 * _DIFFERENCE_STEPS * trajectory.step_s)
-    return (plant.potential_energy(x, moment) - linear, prescribed, *_mesh_dampers(trajectory, x, v, moment))
+    loss, feed = _mesh_dampers(trajectory, x, v, moment)
+    for _, now, still in plant.turning_pairs(x, v, moment):
+        loss, feed = loss + now.lost_w - still.lost_w, feed + now.fed_w
+    return plant.potential_energy(x, moment) - linear, prescribed, loss, feed
 
 
 def _mesh_dampers(trajectory: Trajectory, x: Array, v: Array, moment: Moment) -> tuple[float, float]:

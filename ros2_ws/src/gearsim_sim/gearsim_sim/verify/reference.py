@@ -56,7 +56,7 @@ class Readable:
             memories.append(bearing.rate(memory, total, balls, unit, moment, own))
             at += bearing.size
         force = system.interfaces @ g + system.inputs @ self._of.inputs(step)
-        force -= system.damping @ v + system.stiffness @ x
+        force += plant.turning_force(x, v, moment) - system.damping @ v - system.stiffness @ x
         now = Now(seconds, x, v, moment, self._of.acceleration_hz_per_s(step))
         for side in self._sides:
             push, change = side.act(now, state[at : at + side.size])

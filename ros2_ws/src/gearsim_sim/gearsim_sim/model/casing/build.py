@@ -9,26 +9,29 @@ from typing import Any
 import numpy as np
 
 from gearsim_io.errors import InputError
+from gearsim_sim.model.casing.described import Described
 from gearsim_sim.model.casing.geometry import casing_mesh
-from gearsim_sim.model.casing.params import CasingParams
-from gearsim_sim.model.casing.reduced import ReducedCasing, Site, modal_damping
+from gearsim_sim.model.casing.reduced import Foot, ReducedCasing, Site, modal_damping
 from gearsim_sim.model.casing.reduction import ACCURACY, Reduction, Tell, craig_bampton
-from gearsim_sim.model.casing.sites import SitePlace, default_sites, recover_sites, site_nodes
+from gearsim_sim.model.casing.ring_housing import RingHousing, housing_mesh
+from gearsim_sim.model.casing.sites import SitePlace, default_sites, housing_sites, recover_sites, site_nodes
 from gearsim_sim.model.casing.structure import MeshedStructure, Structure, assemble, thicknesses_m
 
 MODES = 100  # of the thesis's casing (4.3.2)
 
 
-def build_structure(params: CasingParams, *, free: bool = False) -> MeshedStructure:
+def build_structure(params: Described, *, free: bool = False) -> MeshedStructure:
     """Mesh a casing and assemble it; `free` leaves its pads out, as in a modal test on elastic ropes."""
-    mesh = casing_mesh(params)
+    mesh = housing_mesh(params) if isinstance(params, RingHousing) else casing_mesh(params)
     if free:
         mesh = dataclasses.replace(mesh, pads=())
+    if isinstance(params, RingHousing):
+        return assemble(mesh, params.thicknesses_m, params.material, params.name)
     return assemble(mesh, thicknesses_m(params, mesh.regions), params.material, params.name)
 
 
 def reduce_casing(
-    params: CasingParams,
+    params: Described,
     modes: int = MODES,
     extra_sites: Iterable[SitePlace] = (),
     band_hz: float | None = None,
@@ -38,9 +41,9 @@ def reduce_casing(
 
     Parameters
     ----------
-    params : CasingParams
+    params : CasingParams or RingHousing
     modes : int
-        Kept besides the 24 displacements of the four bore centres.
+        Kept besides the six displacements of each master.
     extra_sites : iterable of SitePlace
     band_hz : float, optional
         The reduction must be valid up to here, else InputError.
@@ -49,13 +52,28 @@ def reduce_casing(
     """
     tell("mesh and matrices", 0.0)
     structure = build_structure(params)
-    places = (*default_sites(params), *extra_sites)
+    usual = housing_sites(params) if isinstance(params, RingHousing) else default_sites(params)
+    places = (*usual, *extra_sites)
     reach = params.mesh.plate_size_m
     site_nodes(structure, places, reach)  # a misplaced sensor is told before the work, not after
     reduction = craig_bampton(structure, modes, tell)
     sites = recover_sites(structure, reduction, places, reach)
-    return finish(
+    reduced = finish(
         structure, reduction, sites, params.damping_ratio, band_hz, {"description": params.description}
+    )
+    return dataclasses.replace(reduced, feet=feet_of(structure, reduction))
+
+
+def feet_of(structure: MeshedStructure, reduction: Reduction) -> tuple[Foot, ...]:
+    """The casing's pads, each lifted by the mean of its nodes."""
+    up = np.array([0.0, 1.0, 0.0])
+    return tuple(
+        Foot(
+            pad.name,
+            pad.stiffness_n_per_m[1],
+            np.mean([reduction.rows(structure.row(int(node), up))[0] for node in pad.nodes], axis=0),
+        )
+        for pad in structure.mesh.pads
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from gearsim_io.errors import InputError
 from gearsim_io.quantities import read_yaml
 from gearsim_sim.model.casing.build import finish, reduce_casing
-from gearsim_sim.model.casing.params import load_casing
+from gearsim_sim.model.casing.described import load_described
 from gearsim_sim.model.casing.reduced import ReducedCasing
 from gearsim_sim.model.casing.reduction import Tell, craig_bampton
 from gearsim_sim.model.casing.sites import parse_site
@@ -50,7 +50,7 @@ def reduce_description(
             structure, reduction, sites, about.damping_ratio, band_hz, {"description": about.description}
         )
     extra = [parse_site(text) for text in sensors]
-    return reduce_casing(load_casing(name_or_path), modes, extra, band_hz, tell)
+    return reduce_casing(load_described(name_or_path), modes, extra, band_hz, tell)
 
 
 def _keys(path: Path) -> set[str]:

@@ -51,6 +51,17 @@ class Site:
 
 
 @dataclass(frozen=True)
+class Foot:
+    """A spring under the casing, whose lift can be told: a pad, a bolted foot."""
+
+    name: str
+    stiffness_n_per_m: float
+    """Of its spring along y."""
+    rows: Array
+    """Shape (n,), lift (along y) over coordinates."""
+
+
+@dataclass(frozen=True)
 class ReducedCasing:
     """Mass, stiffness, damping and sensor sites of a casing in Craig-Bampton coordinates.
 
@@ -69,6 +80,8 @@ class ReducedCasing:
     valid_hz: float
     """Up to here the reduction follows the full model within what `provenance` states."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    feet: tuple[Foot, ...] = ()
+    """Springs to the ground that are in `stiffness` and may come loose."""
 
     @property
     def size(self) -> int:
@@ -141,6 +154,7 @@ def save_reduced(casing: ReducedCasing, path: Path) -> None:
         "masters": casing.masters,
         "valid_hz": casing.valid_hz,
         "sites": [site.name for site in casing.sites],
+        "feet": {foot.name: foot.stiffness_n_per_m for foot in casing.feet},
         "provenance": dict(casing.provenance),
     }
     part = path.with_name(path.name + ".part")
@@ -155,6 +169,7 @@ def save_reduced(casing: ReducedCasing, path: Path) -> None:
             site_directions=np.array([site.direction for site in casing.sites]).reshape(-1, 3),
             site_positions_m=np.array([site.position_m for site in casing.sites]).reshape(-1, 3),
             site_rows=np.array([site.rows for site in casing.sites]).reshape(-1, casing.size),
+            foot_rows=np.array([foot.rows for foot in casing.feet]).reshape(-1, casing.size),
             site_corrections=np.array([site.correction for site in casing.sites]).reshape(
                 -1, 6 * len(casing.masters)
             ),
@@ -192,6 +207,8 @@ def _casing(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> ReducedCasin
             about["sites"], *(arrays[name] for name in columns), strict=True
         )
     )
+    feet = about.get("feet", {})  # which older files do not tell
+    lifts = arrays.get("foot_rows", np.zeros((0, 0)))
     return ReducedCasing(
         name=about["name"],
         masters=tuple(about["masters"]),
@@ -202,6 +219,10 @@ def _casing(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> ReducedCasin
         sites=sites,
         valid_hz=float(about["valid_hz"]),
         provenance=about["provenance"],
+        feet=tuple(
+            Foot(name, float(stiffness), _array(rows))
+            for (name, stiffness), rows in zip(feet.items(), lifts, strict=True)
+        ),
     )
 
 
@@ -228,6 +249,8 @@ def _checked(casing: ReducedCasing, where: str) -> ReducedCasing:
     for site in casing.sites:
         shapes[f"rows of {site.name}"] = (site.rows, (size,))
         shapes[f"correction of {site.name}"] = (site.correction, (6 * masters,))
+    for foot in casing.feet:
+        shapes[f"rows of {foot.name}"] = (foot.rows, (size,))
     if size < 6 * masters:
         raise InputError(where, "mass", f"{size} coordinates", f"at least 6 for each of {masters} masters")
     for name, (array, shape) in shapes.items():

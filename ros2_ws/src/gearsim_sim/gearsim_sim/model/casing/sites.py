@@ -12,6 +12,7 @@ from gearsim_sim.model.casing.geometry import MASTERS, bore_centres_m
 from gearsim_sim.model.casing.params import CasingParams
 from gearsim_sim.model.casing.reduced import Site
 from gearsim_sim.model.casing.reduction import Reduction
+from gearsim_sim.model.casing.ring_housing import RingHousing
 from gearsim_sim.model.casing.structure import MeshedStructure
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -49,6 +50,29 @@ def default_sites(params: CasingParams) -> tuple[SitePlace, ...]:
     for name, sign in (("a", -1), ("b", 1)):
         found.append(SitePlace(f"end_{name}_z", (0.0, middle, sign * box.width_m / 2), _AXES["z"]))
     return tuple(found)
+
+
+def housing_sites(params: RingHousing) -> tuple[SitePlace, ...]:
+    """Sites that every housing of a planetary stage has.
+
+    `ring_top_y`, `ring_side_x`: on the wall over the ring gear, as on the measured rig (thesis 7.3);
+    `shell_top_y`: on the wall beside it; `sun_end_z`, `carrier_end_z`: on the end walls, half-way between bore
+    and cylinder; `saddle_y`: on the floor's edge of a saddle.
+    """
+    radius, half = params.cylinder.radius_m, params.cylinder.length_m / 2
+    beside = (params.seat.width_m / 2 + half) / 2
+    found = [
+        SitePlace("ring_top_y", (0.0, radius, 0.0), _AXES["y"]),
+        SitePlace("ring_side_x", (radius, 0.0, 0.0), _AXES["x"]),
+        SitePlace("shell_top_y", (0.0, radius, beside), _AXES["y"]),
+    ]
+    for name, sign, bore in (
+        ("sun", 1, params.ends.sun_bore_radius_m),
+        ("carrier", -1, params.ends.carrier_bore_radius_m),
+    ):
+        found.append(SitePlace(f"{name}_end_z", (0.0, (bore + radius) / 2, sign * half), _AXES["z"]))
+    low = (0.0, -params.saddles.height_m, params.saddles.spacing_m / 2)
+    return (*found, SitePlace("saddle_y", low, _AXES["y"]))
 
 
 def parse_site(text: str) -> SitePlace:

@@ -1,4 +1,4 @@
-"""Looseness: the bolts of a pedestal hold no more; pressed it is stiff, lifted it is soft (`LooseFoot`)."""
+"""Looseness: the bolts of a pedestal (or a casing's foot) hold no more; pressed it is stiff, lifted it is soft (`LooseFoot`)."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class LoosenessParams(Strict):
 
 
 def components(plant: Plant) -> tuple[str, ...]:
-    """Bearings that stand on a pedestal of their own."""
+    """Bearings that stand on a pedestal of their own, or mounts of a flexible casing."""
     return tuple(plant.mounts)
 
 
 def place(params: LoosenessParams, component: str, plant: Plant, seed: int) -> tuple[Contribution, ...]:  # noqa: ARG001
-    """The loose foot of a bearing's pedestal."""
+    """The loose foot of a bearing's pedestal, or of a casing."""
     mount = plant.mounts[component]
     if params.clamp_n is None:
         opens_at = _static_lift(plant, component)
@@ -59,16 +59,17 @@ def place(params: LoosenessParams, component: str, plant: Plant, seed: int) -> t
 
 
 def _static_lift(plant: Plant, component: str) -> float:
-    """Lift of the pedestal of the healthy machine, standing under its nominal load."""
+    """Lift of the foot of the healthy machine, standing under its nominal load."""
     moment = Moment(_STATIC_TURNS, 0.0)
     u = plant.known_inputs(plant.limits.load_nm)
-    rest = static_equilibrium(plant, complex_modes(plant.system), moment, u)
+    standing = plant.standing(_STATIC_TURNS)
+    rest = static_equilibrium(standing, complex_modes(standing.system), moment, u)
     return float(np.dot(plant.system.direction(plant.mounts[component].lift), rest))
 
 
 KIND = FaultKind(
     name="looseness",
-    summary="loose bolts of a pedestal: soft when lifted, stiff when pressed: multiples of the speed",
+    summary="loose bolts of a pedestal or foot: soft when lifted, stiff when pressed: multiples of the speed",
     params_model=LoosenessParams,
     components=components,
     place=place,

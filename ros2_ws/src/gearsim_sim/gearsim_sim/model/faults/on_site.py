@@ -16,14 +16,9 @@ _RIGID = 1e-9
 
 
 def site_directions(plant: Plant, name: str) -> tuple[Vector, ...]:
-    """The direction of a site, or both of one that turns.
-
-    None if the machine's rotation moves it, or if it is on a flexible casing, which has its own resonances.
-    """
+    """The direction of a site, or both of one that turns; none if the machine's rotation moves it."""
     site = plant.sites[name]
     found = (site.x, site.y) if isinstance(site, RotatingSite) else (site,)
-    if plant.carrier is not None and any(plant.carrier.carries(direction) for direction in found):
-        return ()
     for direction in found:
         vector = plant.system.direction(direction)
         if abs(vector @ plant.rigid) > _RIGID * np.abs(vector).max():
