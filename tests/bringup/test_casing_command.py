@@ -8,25 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearsim_bringup.cli import BAD_INPUT, main
-from gearsim_sim.model.casing.params import FOLDER
 from gearsim_sim.model.casing.reduced import find_reduced, load_reduced
-
-
-@pytest.fixture
-def coarse(tmp_path: Path) -> str:
-    """The shipped casing under another name, with large elements."""
-    text = (FOLDER / "unsw_casing.yaml").read_text()
-    for old, new in (
-        ("name: unsw_casing", "name: coarse"),
-        ("plate_size: {value: 7.5,", "plate_size: {value: 25,"),
-        ("ring_size: {value: 7.5,", "ring_size: {value: 20,"),
-        ("ring_layers: {value: 4,", "ring_layers: {value: 1,"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    path = tmp_path / "coarse.yaml"
-    path.write_text(text)
-    return str(path)
 
 
 def test_build_writes_what_reduce_reads(coarse, tmp_path, capsys):

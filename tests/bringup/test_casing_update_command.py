@@ -9,22 +9,7 @@ from pathlib import Path
 import pytest
 
 from gearsim_bringup.cli import BAD_INPUT, main
-from gearsim_sim.model.casing.params import FOLDER, load_casing
-
-
-@pytest.fixture
-def coarse(tmp_path: Path) -> str:
-    text = (FOLDER / "unsw_casing.yaml").read_text()
-    for old, new in (
-        ("name: unsw_casing", "name: coarse"),
-        ("plate_size: {value: 7.5,", "plate_size: {value: 25,"),
-        ("ring_layers: {value: 4,", "ring_layers: {value: 1,"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    path = tmp_path / "coarse.yaml"
-    path.write_text(text)
-    return str(path)
+from gearsim_sim.model.casing.params import load_casing
 
 
 def test_update_leaves_description_table_and_pictures(coarse, tmp_path, capsys):
@@ -45,16 +30,42 @@ def test_update_leaves_description_table_and_pictures(coarse, tmp_path, capsys):
 
 
 def test_a_virtual_hammer_test_is_struck_identified_and_updated_to(coarse, tmp_path, capsys):
-    out = tmp_path / "hammer"
-    assert (
-        main(["casing", "update", coarse, "--hammer", "4", "--steps", "4", "--out", str(out), "--json"]) == 0
-    )
+    out, export = tmp_path / "hammer", tmp_path / "test.uff"
+    hammer = ["casing", "update", coarse, "--hammer", "4", "--steps", "4", "--export", str(export)]
+    assert main([*hammer, "--out", str(out), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["after"]["mean_percent"] < 0.5 * told["before"]["mean_percent"]
     assert set(told["true_change"]) == set(told["change"])
     names = {file.name for file in out.iterdir()}
     assert {"mac.png", "responses.png", "updated.yaml"} <= names
-    assert {Path(file).name for file in told["files"]} == names
+    assert {Path(file).name for file in told["files"]} == names | {"test.uff"}
+    # The same responses through a file, as a laboratory's: the same modes, the same pairs.
+    back = ["casing", "update", coarse, "--test", str(export), "--steps", "1"]
+    assert main([*back, "--out", str(tmp_path / "back"), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["modes_of_test"] == pytest.approx(told["modes_of_test"], rel=1e-9)
+    assert again["before"] == pytest.approx(told["before"], rel=1e-6)
+    assert {file.name for file in (tmp_path / "back").iterdir()} == names
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--test", "none.uff"], "none.uff: got no such file"),
+        (["--test", "none.uff", "--hammer", "1"], "one of them at a time"),
+        (["--placement", "p.yaml"], "--placement goes with --test"),
+        (["--band", "100", "500"], "--band goes with --test"),
+        (["--test", "none.uff", "--placement", "p.yaml"], "p.yaml: got no such file"),
+        (["--test", "none.uff", "--band", "0", "500"], "--band"),
+        (["--export", "test.uff"], "--export goes with --hammer"),
+        (["--hammer", "1", "--export", "test.txt"], "ends in .uff"),
+    ],
+)
+def test_options_that_do_not_go_together_are_one_line(arguments, told, coarse, tmp_path, capsys):
+    assert main(["casing", "update", coarse, *arguments, "--out", str(tmp_path / "out")]) == BAD_INPUT
+    said = capsys.readouterr().err.strip()
+    assert told in said
+    assert "\n" not in said
 
 
 def test_a_file_in_the_way_is_told_in_one_line(coarse, tmp_path, capsys):

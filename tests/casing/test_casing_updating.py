@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from coarse_casing import write_coarse_casing
 from ruamel.yaml import YAML
 from small_casing import small_params
 
@@ -15,7 +16,7 @@ from gearsim_sim.model.casing.eigen import free_modes
 from gearsim_sim.model.casing.geometry import casing_mesh
 from gearsim_sim.model.casing.material import STEEL
 from gearsim_sim.model.casing.mesh import Mesh
-from gearsim_sim.model.casing.params import FOLDER, load_casing
+from gearsim_sim.model.casing.params import load_casing
 from gearsim_sim.model.casing.plates import rectangle
 from gearsim_sim.model.casing.sensitivity import thickness_sensitivity
 from gearsim_sim.model.casing.structure import assemble, thicknesses_m
@@ -112,10 +113,7 @@ def test_bounds_hold(altered):
 
 
 def test_an_updated_description_is_one_that_builds_the_updated_casing(tmp_path):
-    coarse = tmp_path / "coarse.yaml"
-    text = (FOLDER / "unsw_casing.yaml").read_text()
-    text = text.replace("plate_size: {value: 7.5,", "plate_size: {value: 25,")
-    coarse.write_text(text.replace("ring_layers: {value: 4,", "ring_layers: {value: 1,"))
+    coarse = write_coarse_casing(tmp_path)
     params = load_casing(str(coarse))
     update = update_to_thesis(params, 2, mirrored=False, tell=lambda _step: None)
     off = [np.abs(update.deviations(after=after)).mean() for after in (False, True)]
@@ -124,7 +122,7 @@ def test_an_updated_description_is_one_that_builds_the_updated_casing(tmp_path):
     write_description(updated_description(description_path(str(coarse)), update, BASIS), path)
     assert [file.name for file in tmp_path.glob("*.part")] == []
     again = load_casing(str(path))
-    assert again.name == "unsw_casing_updated"
+    assert again.name == "coarse_updated"
     thickness = thicknesses_m(again, update.regions)
     np.testing.assert_allclose(thickness, update.after.thickness_m, atol=1e-7)
     kept = YAML(typ="safe").load(path.read_text())

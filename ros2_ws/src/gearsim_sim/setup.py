@@ -28,6 +28,7 @@ setup(
             "sensors/catalogue/*/*.yaml",
             "model/casing/descriptions/*.*",
             "model/casing/reduced_files/*.npz",
+            "frf/files/*.npz",
         ]
     },
     data_files=[
@@ -44,8 +45,8 @@ setup(
         "ruamel.yaml>=0.18",
         f"gearsim_io=={VERSION}",
     ],
-    # What reads Nastran's matrices of a casing of one's own; what finds the modes of its modal test.
-    extras_require={"nastran": ["pyyeti>=1.4.7"], "modal_test": ["sdypy-EMA>=0.31"]},
+    # What reads Nastran's matrices of a casing of one's own; what reads its modal test and finds the modes.
+    extras_require={"nastran": ["pyyeti>=1.4.7"], "modal_test": ["sdypy-EMA>=0.31", "pyuff>=2.4"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

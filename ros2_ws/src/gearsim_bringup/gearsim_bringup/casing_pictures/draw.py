@@ -22,7 +22,8 @@ from gearsim_sim.model.casing.structure import MeshedStructure
 COLUMNS = 4
 # Largest displacement drawn, over the casing's longest side.
 STRETCH = 0.07
-VIEWS = (View(azimuth_deg=30, elevation_deg=32), View(azimuth_deg=145, elevation_deg=32))
+# Together they show every plate from outside, the floor too.
+VIEWS = (View(azimuth_deg=30, elevation_deg=32), View(azimuth_deg=215, elevation_deg=-32))
 _RING = "#8d8d8d"
 _GROUPS = (
     ("plates", "#c9d7e8"),

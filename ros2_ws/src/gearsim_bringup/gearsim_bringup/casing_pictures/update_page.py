@@ -46,11 +46,13 @@ def write_update(
     return files
 
 
-def write_test(tested: TestedUpdate, test: ModalTest, out: Path) -> list[Path]:
-    """Pictures of the test beside those of the updating; their paths."""
-    files = [out / "mac.png", out / "responses.png"]
+def write_test(tested: TestedUpdate, test: ModalTest | None, out: Path) -> list[Path]:
+    """Pictures of the test beside those of the updating; their paths. Without responses none of them."""
+    files = [out / "mac.png"]
     draw_macs(tested, files[0])
-    draw_responses(tested, test, files[1])
+    if test is not None:
+        files.append(out / "responses.png")
+        draw_responses(tested, test, files[-1])
     return files
 
 

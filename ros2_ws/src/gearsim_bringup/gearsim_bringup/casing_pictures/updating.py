@@ -20,7 +20,7 @@ _RING = (0.62, 0.62, 0.62)
 
 
 def draw_thickness(mesh: Mesh, change: Array, path: Path, title: str) -> None:
-    """Relative change of thickness of each region on the mesh, from two sides; rings grey."""
+    """Relative change of thickness of each region on the mesh, from above and below; rings grey."""
     figure = Figure(figsize=(13, 6.2), layout="constrained")
     faces, regions = outside(mesh)
     most = max(1.0, 100 * float(np.abs(change).max()))
@@ -38,12 +38,14 @@ def draw_deviations(update: Update, path: Path) -> None:
     """Deviation of each paired frequency before and after."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     axes = figure.subplots()
+    # Frequencies of either side: one that has a pair on one side only has one bar.
+    sides = (update.first_pairs.measured_hz, update.last_pairs.measured_hz)
+    measured = np.unique(np.concatenate(sides))
     for after, shift, colour in ((False, -0.2, "#c9a227"), (True, 0.2, "#2f6690")):
         off = 100 * update.deviations(after=after)
         name = "after" if after else "before"
         label = f"{name}: mean {np.abs(off).mean():.2f} %, worst {np.abs(off).max():.2f} %"
-        axes.bar(np.arange(len(off)) + shift, off, 0.4, color=colour, label=label)
-    measured = update.last_pairs.measured_hz
+        axes.bar(np.searchsorted(measured, sides[after]) + shift, off, 0.4, color=colour, label=label)
     axes.set_xticks(np.arange(len(measured)), [f"{hz:.0f}" for hz in measured], rotation=45)
     axes.axhline(0, color="black", linewidth=0.8)
     axes.set_xlabel("measured frequency [Hz]")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from gearsim_bringup.commands.casing_update import update
 from gearsim_bringup.options import ANY_PATH, POSITIVE, example, json_option
 from gearsim_bringup.ui import Voice
 
 if TYPE_CHECKING:
     from gearsim_sim.model.casing.reduced import ReducedCasing
     from gearsim_sim.model.casing.reduction import Tell
-    from gearsim_sim.model.casing.updating import Update
 
 DEFAULT = "unsw_casing"
 GROUP_EXAMPLE = """
@@ -32,9 +32,9 @@ REDUCE_EXAMPLE = """
 ./gearsim casing reduce my_casing.yaml --modes 300 --band 8000 --sensor lid:0,0.12,0.03:y --out out/mine.npz
 ./gearsim casing reduce my_matrices.yaml --out out/mine.npz    # your own K and M, see docs/casing.md
 """
-UPDATE_EXAMPLE = """
-./gearsim casing update --out out/updated
-./gearsim casing update --hammer 1 --out out/hammer     # a virtual test of a casing that differs
+RESPONSES_EXAMPLE = """
+./gearsim casing responses --out out/responses.npz
+./gearsim casing responses out/mine.npz --band 8000 --out out/responses.npz   # from a reduced casing
 """
 
 
@@ -153,6 +153,48 @@ def _tell_reduced(voice: Voice, reduced: ReducedCasing, out: Path) -> None:
     )
 
 
+@command.command("responses", epilog=example(RESPONSES_EXAMPLE))
+@click.argument("casing", default=DEFAULT)
+@click.option("--out", required=True, type=ANY_PATH, help="File to write (.npz).")
+@click.option(
+    "--modes", default=900, show_default=True, type=click.IntRange(min=0), help="Kept beside masters."
+)
+@click.option(
+    "--band",
+    "band_hz",
+    type=POSITIVE,
+    default=20000.0,
+    show_default=True,
+    help="Refuse unless valid so far [Hz].",
+)
+@click.option("--sensor", "sensors", multiple=True, help="NAME:X,Y,Z:DIRECTION in metres; repeatable.")
+@json_option
+def responses(
+    casing: str, out: Path, modes: int, band_hz: float, sensors: tuple[str, ...], json_mode: bool
+) -> None:
+    """Frequency responses of CASING from its bearing seats to its sensors, for `path: frf` in scenarios.
+
+    CASING may also be a file that `reduce` has made.
+    """
+    from gearsim_sim.frf.file import save_responses
+    from gearsim_sim.frf.make import make_responses
+    from gearsim_sim.model.casing.reduce_file import check_target
+
+    voice = Voice(json_mode=json_mode)
+    check_target(out)
+    with voice.progress() as bar:
+        task = bar.add_task("reading", total=1.0)
+        tell: Tell = lambda step, done: bar.update(task, description=step, completed=done)  # noqa: E731
+        found = make_responses(casing, modes, sensors, band_hz, tell)
+    save_responses(found, out)
+    voice.say(f"{found.name}: responses to {len(found.inputs)} forces, {', '.join(found.inputs)}")
+    voice.say(f"  {len(found.omega)} modes, valid up to {found.valid_hz:.0f} Hz")
+    voice.say(f"  sensors: {', '.join(found.sites) or 'none'}")
+    voice.say(f"  {out}")
+    content = {"name": found.name, "file": str(out), "modes": len(found.omega), "valid_hz": found.valid_hz}
+    voice.result({**content, "forces": found.inputs, "sensors": found.sites})
+
+
 @command.command("show", epilog=example("./gearsim casing show --modes 12 --out out/casing"))
 @click.argument("casing", default=DEFAULT)
 @click.option("--out", required=True, type=ANY_PATH, help="Folder for the pictures.")
@@ -176,58 +218,4 @@ def show(casing: str, out: Path, modes: int, mounted: bool, json_mode: bool) -> 
     voice.result({"files": [str(file) for file in files], "frequencies_hz": frequencies})
 
 
-@command.command("update", epilog=example(UPDATE_EXAMPLE))
-@click.argument("casing", default=DEFAULT)
-@click.option("--out", required=True, type=ANY_PATH, help="Folder for description, table and pictures.")
-@click.option("--steps", default=9, show_default=True, type=click.IntRange(1, 50), help="At most so many.")
-@click.option("--mirrored", is_flag=True, help="Mirror images of a strip change alike.")
-@click.option(
-    "--hammer", type=click.IntRange(min=0), help="Seed of a virtual hammer test in place of the thesis's."
-)
-@json_option
-def update(casing: str, out: Path, steps: int, mirrored: bool, hammer: int | None, json_mode: bool) -> None:
-    """Update CASING's plate thickness by regions to the modal test of the thesis (Table 3.1).
-
-    With --hammer a casing whose welds differ is struck instead, its modes are identified and paired by MAC,
-    and mirror images change alike.
-    """
-    from gearsim_bringup.casing_pictures.update_page import make_folder, write_test, write_update
-    from gearsim_sim.model.casing.against_thesis import BASIS, update_to_thesis
-    from gearsim_sim.model.casing.params import load_casing
-    from gearsim_sim.model.casing.virtual_test import run_virtual_test
-
-    voice = Voice(json_mode=json_mode)
-    params = load_casing(casing)
-    make_folder(out)
-    content: dict[str, Any] = {"name": params.name}
-    with voice.progress() as bar:
-        task = bar.add_task("mesh", total=None)
-        tell = lambda step: bar.update(task, description=step)  # noqa: E731
-        if hammer is None:
-            found = update_to_thesis(params, steps, mirrored=mirrored, tell=tell)
-            files = write_update(casing, found, BASIS, out, tell)
-        else:
-            virtual = run_virtual_test(params, hammer, steps, tell)
-            found = virtual.tested.update
-            files = write_update(casing, found, f"virtual hammer test {hammer}", out, tell)
-            files += write_test(virtual.tested, virtual.test, out)
-            content["true_change"] = dict(zip(found.regions, virtual.true_change.tolist(), strict=True))
-    _tell_updated(voice, found, files, content)
-
-
-def _tell_updated(voice: Voice, found: Update, files: list[Path], content: dict[str, Any]) -> None:
-    for name, after in (("before", False), ("after", True)):
-        off = 100 * abs(found.deviations(after=after))
-        content[name] = {
-            "pairs": len(off),
-            "mean_percent": float(off.mean()),
-            "worst_percent": float(off.max()),
-        }
-        voice.say(
-            f"{name + ':':8}{len(off)} frequencies off by {off.mean():.2f} %, {off.max():.2f} % at worst"
-        )
-    for file in files:
-        voice.say(f"  {file}")
-    changes = dict(zip(found.regions, found.change.tolist(), strict=True))
-    told = [str(file) for file in files]
-    voice.result({**content, "steps": found.steps, "change": changes, "files": told})
+command.add_command(update)

@@ -22,6 +22,7 @@ from gearsim_sim.model.casing.updating import (
 )
 
 BAND_HZ = (100.0, 2000.0)  # modes of the thesis's test (3.3)
+# Of the model: in that band, and half as many beyond.
 MODES = 60
 # Of an identified frequency and of what strips cannot follow of a weld, relative.
 FREQUENCY_STD = 0.002
@@ -59,13 +60,27 @@ def update_to_test(
     tell : callable
     """
     tell("poles and shapes")
-    identified = identify(test, *BAND_HZ)
+    return update_to_modes(params, plan, identify(test, *BAND_HZ), most_steps, tell)
+
+
+def update_to_modes(
+    params: CasingParams, plan: TestPlan, identified: IdentifiedModes, most_steps: int, tell: Tell
+) -> TestedUpdate:
+    """As `update_to_test`, to modes that have been identified.
+
+    Raises
+    ------
+    InputError
+        If there are none, or none of them is like a mode of the casing.
+    """
+    if not len(identified.frequencies_hz):
+        raise InputError(params.name, "modal test", "no modes", "some that two references agree on")
 
     def pairing(model: FreeModel) -> Match:
         values = model_mac(plan, identified, model)
         rows, columns = pair_by_mac(values, identified.frequencies_hz, model.frequencies_hz)
         if not len(rows):
-            what = f"{len(identified.frequencies_hz)} modes identified, none like one of the model"
+            what = f"{len(identified.frequencies_hz)} modes, none of them like one of the model"
             raise InputError(params.name, "modal test", what, "at least one pair")
         missed = len(identified.frequencies_hz) - len(rows)
         return Match(identified.frequencies_hz[rows], columns, values[rows, columns], missed)
@@ -73,13 +88,18 @@ def update_to_test(
     update = update_thickness(
         params,
         pairing,
-        MODES,
+        _modes_for(float(identified.frequencies_hz[-1])),
         mirror_prior,
         frequency_std=FREQUENCY_STD,
         most_steps=most_steps,
         tell=tell,
     )
     return TestedUpdate(identified, update, plan)
+
+
+def _modes_for(highest_hz: float) -> int:
+    """How many of the model's modes to compute: those of plates are as dense at all frequencies."""
+    return max(MODES, int(np.ceil(MODES * highest_hz / BAND_HZ[1])))
 
 
 def model_mac(plan: TestPlan, identified: IdentifiedModes, model: FreeModel) -> Array:

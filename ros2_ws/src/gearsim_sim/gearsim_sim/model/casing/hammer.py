@@ -103,18 +103,17 @@ def accelerance(specimen: Specimen, plan: TestPlan, frequencies_hz: Array) -> ND
     """Exact responses, shape (references, points, lines)."""
     model, structure = specimen.model, specimen.model.structure
     speeds = 2 * np.pi * frequencies_hz
-    rows = plan.rows(model)
-    rigid = _rigid_modes(model)
-    rigid_rows = plan.rows(FreeModel(structure, model.thickness_m, np.zeros(6), rigid))
+    body = FreeModel(structure, model.thickness_m, np.zeros(6), _rigid_modes(model))
     own = np.sqrt(model.squares)
     poles = [
-        (rows, model.squares, 2 * specimen.damping * own),
-        (rigid_rows, np.full(6, (2 * np.pi * CORD_HZ) ** 2), np.full(6, 4 * np.pi * CORD_DAMPING * CORD_HZ)),
+        (model, model.squares, 2 * specimen.damping * own),
+        (body, np.full(6, (2 * np.pi * CORD_HZ) ** 2), np.full(6, 4 * np.pi * CORD_DAMPING * CORD_HZ)),
     ]
-    total = _residual(model, plan, rows, rigid_rows)[:, :, None] * np.ones(len(speeds), dtype=complex)
-    for shapes, squares, widths in poles:
+    total = _residual(model, body, plan)[:, :, None] * np.ones(len(speeds), dtype=complex)
+    for moving, squares, widths in poles:
+        shapes, at_references = plan.rows(moving), plan.reference_rows(moving)
         filters = 1 / (squares[:, None] - speeds**2 + 1j * widths[:, None] * speeds)
-        total += np.einsum("rm,pm,mf->rpf", shapes[plan.references], shapes, filters, optimize=True)
+        total += np.einsum("rm,pm,mf->rpf", at_references, shapes, filters, optimize=True)
     return np.asarray(-(speeds**2) * total)
 
 
@@ -125,17 +124,17 @@ def _rigid_modes(model: FreeModel) -> Array:
     return np.asarray(np.linalg.solve(lower, motion.T).T)
 
 
-def _residual(model: FreeModel, plan: TestPlan, rows: Array, rigid_rows: Array) -> Array:
+def _residual(model: FreeModel, body: FreeModel, plan: TestPlan) -> Array:
     """Static flexibility of the modes beyond those computed, shape (references, points)."""
     structure = model.structure
     # Far below the modes left out, far above rounding.
     shift = (2 * np.pi * 20.0) ** 2
     factor = factorise(structure.stiffness + shift * structure.mass)
     places = [structure.row(int(n), way) for n, way in zip(plan.nodes, plan.directions, strict=True)]
+    kept = plan.reference_rows(model) / (model.squares + shift) @ plan.rows(model).T
+    kept += plan.reference_rows(body) / shift @ plan.rows(body).T
     found = []
-    for reference in plan.references:
-        moved = factor.solve(places[reference].toarray()[0])
-        whole = np.array([(place @ moved)[0] for place in places])
-        kept = rows @ (rows[reference] / (model.squares + shift))
-        found.append(whole - kept - rigid_rows @ rigid_rows[reference] / shift)
-    return np.array(found)
+    for node, way in zip(plan.reference_nodes, plan.reference_directions, strict=True):
+        moved = factor.solve(structure.row(int(node), way).toarray()[0])
+        found.append([(place @ moved)[0] for place in places])
+    return np.asarray(np.array(found) - kept)

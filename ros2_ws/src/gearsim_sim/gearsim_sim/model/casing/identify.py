@@ -36,7 +36,14 @@ class IdentifiedModes:
     shapes: NDArray[np.complex128]
     """At the points, shape (points, modes), each of unit length."""
     agreement: Array
-    """MAC between the two references that saw each mode best."""
+    """MAC between the two references that saw each mode best; NaN where others identified them."""
+
+    def within(self, low_hz: float, high_hz: float) -> IdentifiedModes:
+        """Those between two frequencies."""
+        kept = (self.frequencies_hz >= low_hz) & (self.frequencies_hz <= high_hz)
+        return IdentifiedModes(
+            self.frequencies_hz[kept], self.damping[kept], self.shapes[:, kept], self.agreement[kept]
+        )
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ POINTS = 89  # of the thesis's test (3.3)
 
 @dataclass(frozen=True)
 class TestPlan:
-    """Points to hit across their plates; at three of them, of x, y and z, accelerometers."""
+    """Points to hit and where accelerometers sit, or the other way round: by reciprocity that is the same."""
 
     __test__ = False  # no test of pytest's
 
@@ -25,16 +25,25 @@ class TestPlan:
     """Of the mesh, shape (points,)."""
     directions: Array
     """Unit vectors, shape (points, 3)."""
-    references: Cells
-    """Indices into `nodes`."""
+    reference_nodes: Cells
+    """Shape (references,)."""
+    reference_directions: Array
+    """Shape (references, 3)."""
+
+    @property
+    def references(self) -> Cells:
+        """Which point each reference is, -1 where it is none; shape (references,)."""
+        places = zip(self.reference_nodes, self.reference_directions, strict=True)
+        same = [(self.nodes == node) & (self.directions @ way > 1 - 1e-9) for node, way in places]
+        return np.array([int(np.argmax(one)) if one.any() else -1 for one in same], dtype=np.int64)
 
     def rows(self, model: FreeModel) -> Array:
         """Displacements of a model's modes at the points, shape (points, modes)."""
-        pick = [model.structure.row(node, way) @ model.shapes for node, way in self._places()]
-        return np.concatenate(pick)
+        return _rows(model, self.nodes, self.directions)
 
-    def _places(self) -> list[tuple[int, Array]]:
-        return list(zip(self.nodes.tolist(), self.directions, strict=True))
+    def reference_rows(self, model: FreeModel) -> Array:
+        """The same at the references, shape (references, modes)."""
+        return _rows(model, self.reference_nodes, self.reference_directions)
 
 
 @dataclass(frozen=True)
@@ -49,8 +58,16 @@ class ModalTest:
     """[1/kg], shape (references, points, lines)."""
 
 
+def _rows(model: FreeModel, nodes: Cells, directions: Array) -> Array:
+    picked = [
+        model.structure.row(node, way) @ model.shapes
+        for node, way in zip(nodes.tolist(), directions, strict=True)
+    ]
+    return np.concatenate([np.zeros((0, model.shapes.shape[1])), *picked])
+
+
 def plan_test(model: FreeModel, points: int = POINTS) -> TestPlan:
-    """Points spread over the plates as far from each other as possible, and references that see all modes.
+    """Points across plates, as far from each other as possible, and three references that see all modes.
 
     From the model before the test alone, as a laboratory would plan it (pretest analysis, thesis 3.2.2.1).
     """
@@ -58,10 +75,10 @@ def plan_test(model: FreeModel, points: int = POINTS) -> TestPlan:
     nodes, normals = _plate_nodes(mesh)
     chosen = _spread(mesh.nodes_m[nodes], points)
     axis = np.argmax(np.abs(normals[chosen]), axis=1)
-    plan = TestPlan(nodes[chosen], np.eye(3)[axis], np.arange(points))
-    seen = np.log(np.abs(plan.rows(model)) + 1e-12).mean(axis=1)
+    places, ways = nodes[chosen], np.eye(3)[axis]
+    seen = np.log(np.abs(_rows(model, places, ways)) + 1e-12).mean(axis=1)
     best = [int(np.argmax(np.where(axis == k, seen, -np.inf))) for k in range(3)]
-    return TestPlan(plan.nodes, plan.directions, np.array(best))
+    return TestPlan(places, ways, places[best], ways[best])
 
 
 def _plate_nodes(mesh: Mesh) -> tuple[Cells, Array]:

@@ -10,6 +10,7 @@ from gearsim_sim.model.casing.from_test import BAND_HZ, MODES, TestedUpdate, upd
 from gearsim_sim.model.casing.hammer import make_specimen, strike
 from gearsim_sim.model.casing.identify import require_ema
 from gearsim_sim.model.casing.material import Array
+from gearsim_sim.model.casing.mesh import Mesh
 from gearsim_sim.model.casing.modal_test import ModalTest, plan_test
 from gearsim_sim.model.casing.params import CasingParams
 from gearsim_sim.model.casing.structure import thicknesses_m
@@ -24,6 +25,7 @@ LINE_HZ = 1.0
 class VirtualTest:
     """What was done, what was found, and what was true."""
 
+    mesh: Mesh
     test: ModalTest
     tested: TestedUpdate
     true_change: Array
@@ -50,4 +52,5 @@ def run_virtual_test(params: CasingParams, seed: int, most_steps: int, tell: Tel
     tell("blows of the hammer")
     lines = np.arange(0.0, 1.1 * BAND_HZ[1] + LINE_HZ, LINE_HZ)
     test = strike(specimen, plan, lines, seed)
-    return VirtualTest(test, update_to_test(params, plan, test, most_steps, tell), specimen.change)
+    tested = update_to_test(params, plan, test, most_steps, tell)
+    return VirtualTest(mesh, test, tested, specimen.change)
