@@ -159,16 +159,14 @@ class Engine:
         course = self._operation.course(self.plant, 1.0 / step_rate_hz, speed_hz, load_nm, seed)
         forces = self._operation.forces(self.plant)
         self._schedule = first_schedule(self.plant, self._timeline, self._steps, course, faults, forces)
-        probed = bool(self._probes)
-        self._stepper = Stepper(
-            self.plant, self._schedule, self._sites, self._steps, probed=probed, forces=self._forces
-        )
+        outputs = {"probed": bool(self._probes), "forces": self._forces}
+        self._stepper = Stepper(self.plant, self._schedule, self._sites, self._steps, **outputs)
         self._taps = padded_taps(self._steps)
         columns = (2 * HALF_LENGTH_SAMPLES + _BLOCK_SAMPLES) * self._steps + self._taps.size
         self._accel = np.zeros((self._stepper.row_count, columns))
 
     def _settle(self, first: int) -> None:
-        """Run up to the step before the one where the filter of the first sample to be put out begins."""
+        """Run up to the step before the one where the filter of sample `first` begins."""
         self._motions: list[Motion] = []
         self._next = first
         last = (first - HALF_LENGTH_SAMPLES) * self._steps - 1

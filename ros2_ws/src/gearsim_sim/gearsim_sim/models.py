@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from gearsim_sim.events import Event, FaultSpec
+from gearsim_sim.frf.sites import place_of
 
 if TYPE_CHECKING:
     from gearsim_sim.engine import EngineOutput
@@ -119,9 +120,15 @@ def parameters(scenario: Scenario) -> Any:
 
 def _engine(scenario: Scenario) -> RunningModel:
     from gearsim_sim.engine import Engine
+    from gearsim_sim.frf.model import ResponseModel
+    from gearsim_sim.frf.of_machine import machine_responses
 
-    return Engine(
-        parameters(scenario),
+    params = parameters(scenario)
+    looked_at = [site for row in scenario.sensors.accelerometers for site, _ in row.looks_at]
+    through = [place for site in looked_at if (place := place_of(site)) is not None]
+    responses = machine_responses(params) if through else None
+    engine = Engine(
+        params,
         scenario.seed,
         scenario.sample_rate_hz,
         scenario.oversampling,
@@ -129,8 +136,11 @@ def _engine(scenario: Scenario) -> RunningModel:
         speed_hz=None if scenario.operation.profile.trace else scenario.speed_hz,
         load_nm=scenario.load_nm,
         operation=scenario.operation,
-        looked_at=[site for row in scenario.sensors.accelerometers for site, _ in row.looks_at],
+        looked_at=[site for site in looked_at if place_of(site) is None],
+        forces=bool(through),
+        settling=bool(through),
     )
+    return engine if responses is None else ResponseModel(engine, responses, through)
 
 
 MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = dict.fromkeys(_PARAMETERS, _engine)

@@ -25,11 +25,14 @@ class CasingGearboxParams:
         What its bearings stand in.
     finite : bool
         Whether shafts are finite elements, else lumped.
+    responses : str or None
+        Name or path of its frequency responses.
     """
 
     gearbox: ParallelParams
     casing: ReducedCasing
     finite: bool = False
+    responses: str | None = None
 
     @property
     def where(self) -> str:
@@ -68,8 +71,12 @@ def load_casing_gearbox_params(
         raise InputError(gearbox.where, "casing", "nothing", "a section with a reduced casing")
     if finite and gearbox.model.finite_shafts is None:
         raise InputError(gearbox.where, "finite_shafts", "nothing", "a section with the shafts' dimensions")
-    replaced = overrides is not None and "casing.reduced" in overrides
-    beside = Path(source) if replaced else read_machine_file(machine)[0]
-    name = named.reduced
-    own = str(beside.parent / name) if name.endswith(".npz") else name
-    return CasingGearboxParams(gearbox, find_reduced(own), finite)
+
+    def own(key: str, name: str) -> str:
+        """A file's path is from the folder of what names it."""
+        replaced = overrides is not None and f"casing.{key}" in overrides
+        beside = Path(source) if replaced else read_machine_file(machine)[0]
+        return str(beside.parent / name) if name.endswith(".npz") else name
+
+    responses = None if named.responses is None else own("responses", named.responses)
+    return CasingGearboxParams(gearbox, find_reduced(own("reduced", named.reduced)), finite, responses)

@@ -94,6 +94,8 @@ class Casing(Strict):
 
     reduced: str
     """Name of a shipped reduced casing, or path of one (.npz) from the folder of the file that names it."""
+    responses: str | None = None
+    """Frequency responses of the same casing, by name or path, for accelerometers with `path: frf`."""
 
 
 class Physics(Strict):

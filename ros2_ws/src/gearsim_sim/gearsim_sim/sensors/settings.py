@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -58,6 +58,7 @@ def _mix(raw: Any) -> Any:
 
 
 Sites = Annotated[Mix | None, BeforeValidator(_mix)]
+SignalPath = Literal["modes", "frf"]
 
 
 class Effects(Strict):
@@ -88,7 +89,7 @@ class Effects(Strict):
         """What was written, under the names of `Row`."""
         names = {"range": "full_scale", "bandwidth": "bandwidth_hz", "delay": "delay_s"}
         names["noise_corner"] = "noise_corner_hz"
-        own = self.model_fields_set - {"site", "axis", "description"}
+        own = self.model_fields_set - {"site", "axis", "path", "description"}
         found = {names.get(key, key): getattr(self, key) for key in own}
         if found.get("adc_bits") is not None:
             found["adc_bits"] = round(found["adc_bits"])
@@ -147,6 +148,8 @@ class OneAccelerometer(AccelerometerEffects):
     of its name."""
     axis: str | None = None
     """Direction, for people."""
+    path: SignalPath | None = None
+    """How the motion comes to it; default: that of all accelerometers."""
     cross_axis: Annotated[Mix | None, OrOff(), BeforeValidator(_mix)] = None
     """Other sites that come through, with the parts of them that do."""
 
@@ -178,6 +181,9 @@ class AccelerometersModel(Strict):
     """Channels that exist; default: all of the machine."""
     sampling: Sampling = Sampling()
     """How the converter samples all of them."""
+    path: SignalPath = "modes"
+    """How the motion comes to them: from the model's own `modes`, or in a flexible casing from the bearings'
+    forces through its frequency responses, `frf`, which reach much higher."""
     all: AccelerometerEffects = AccelerometerEffects()
     """Changes of every channel."""
     each: dict[str, OneAccelerometer] = Field(default_factory=dict)

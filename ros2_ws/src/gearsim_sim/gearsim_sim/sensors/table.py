@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from gearsim_io.errors import InputError
 from gearsim_io.nameplate import Channel, Machine
+from gearsim_sim.frf.sites import through_responses
 from gearsim_sim.sensors.marks import Pickup
 from gearsim_sim.sensors.rows import Encoder, Row, SensorTable, Tacho
 from gearsim_sim.sensors.settings import (
@@ -15,6 +16,7 @@ from gearsim_sim.sensors.settings import (
     Effects,
     EncodersModel,
     SensorsModel,
+    SignalPath,
     TachosModel,
     TorquesModel,
     chain,
@@ -81,12 +83,24 @@ def _row(name: str, channel: Channel | None, model: AccelerometersModel, effects
     row = dataclasses.replace(row, **model.all.given())
     one = model.each.get(name)
     if one is None:
-        return row
+        return _by_path(row, model.path)
     site = row.site if one.site is None else one.site
     if isinstance(site, tuple) and len(site) == 1 and site[0][1] == 1.0:
         site = site[0][0]
     axis = row.axis if one.axis is None else one.axis
-    return dataclasses.replace(row, **one.given(), site=site, axis=axis)
+    row = dataclasses.replace(row, **one.given(), site=site, axis=axis)
+    return _by_path(row, one.path or model.path)
+
+
+def _by_path(row: Row, path: SignalPath) -> Row:
+    """The row, looking at the same places through the casing's frequency responses if that is its path."""
+    if path == "modes":
+        return row
+    cross = tuple((through_responses(name), part) for name, part in row.cross_axis)
+    if isinstance(row.site, str):
+        return dataclasses.replace(row, site=through_responses(row.site), cross_axis=cross)
+    site = tuple((through_responses(name), weight) for name, weight in row.site)
+    return dataclasses.replace(row, site=site, cross_axis=cross)
 
 
 def _torques(model: TorquesModel, machine: Machine, where: str) -> tuple[Row, ...]:

@@ -21,11 +21,12 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 from gearsim_io.errors import InputError
-from gearsim_sim.model.casing.eigen import lowest_modes, signs
+from gearsim_sim.model.casing.eigen import signs
 from gearsim_sim.model.casing.follow import Leftover, reduced_modes
 from gearsim_sim.model.casing.held import held_factor
 from gearsim_sim.model.casing.material import Array
 from gearsim_sim.model.casing.shell import Cells
+from gearsim_sim.model.casing.slices import sliced_modes
 from gearsim_sim.model.casing.structure import Structure
 
 # Largest error of an own frequency, relative, up to each frequency [Hz]; the last one holds beyond too.
@@ -124,7 +125,7 @@ def craig_bampton(
     static = -factor.solve(parts.k_sm)
     tell("modes", 0.2)
     found = min(modes + 1 + int(np.ceil(BEYOND * modes)), len(others) - 1)
-    squares, shapes = lowest_modes(parts.k_ss, parts.m_ss, found, factor=factor)
+    squares, shapes = sliced_modes(parts.k_ss, parts.m_ss, found, factor=factor)
     tell("residual vectors", 0.9)
     work = _Work(parts, static, modes, squares, shapes, factor)
     counts = range(0, min(len(held), modes // 2) + 1, 2) if residuals is None else (residuals,)
