@@ -9,12 +9,12 @@ import numpy as np
 
 from gearsim_bringup.casing_pictures.draw import draw_mesh, draw_modes
 from gearsim_sim.model.casing.build import build_structure
+from gearsim_sim.model.casing.described import Described
 from gearsim_sim.model.casing.eigen import free_modes, lowest_modes
-from gearsim_sim.model.casing.params import CasingParams
 
 
 def draw_casing(
-    params: CasingParams, out: Path, modes: int, *, mounted: bool, tell: Callable[[str], None]
+    params: Described, out: Path, modes: int, *, mounted: bool, tell: Callable[[str], None]
 ) -> tuple[list[Path], list[float]]:
     """Write `mesh.png` and `modes.png`; the files, and the frequencies of the modes drawn [Hz].
 

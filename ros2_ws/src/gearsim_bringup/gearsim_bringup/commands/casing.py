@@ -57,11 +57,11 @@ def command() -> None:
 def build(casing: str, free: bool, out: Path | None, deck: Path | None, json_mode: bool) -> None:
     """Mesh CASING and assemble its mass and stiffness."""
     from gearsim_sim.model.casing.build import build_structure
+    from gearsim_sim.model.casing.described import load_described
     from gearsim_sim.model.casing.export import write_deck_of, write_matrices
-    from gearsim_sim.model.casing.params import load_casing
 
     voice = Voice(json_mode=json_mode)
-    params = load_casing(casing)
+    params = load_described(casing)
     structure = build_structure(params, free=free)
     mesh = structure.mesh
     voice.say(f"{params.name}: {len(mesh.quads)} shells, {len(mesh.hexes)} solid elements,")
@@ -111,7 +111,7 @@ def check(casing: str, finer: bool, json_mode: bool) -> int:
     "--modes", default=100, show_default=True, type=click.IntRange(min=0), help="Kept beside masters."
 )
 @click.option("--band", "band_hz", type=POSITIVE, help="Refuse unless valid up to here [Hz].")
-@click.option("--sensor", "sensors", multiple=True, help="NAME:X,Y,Z:DIRECTION in metres; repeatable.")
+@click.option("--sensor", "sensors", multiple=True, help=SENSOR_HELP)
 @json_option
 def reduce(
     casing: str, out: Path, modes: int, band_hz: float | None, sensors: tuple[str, ...], json_mode: bool
@@ -157,7 +157,7 @@ def _tell_reduced(voice: Voice, reduced: ReducedCasing, out: Path) -> None:
 @click.argument("casing", default=DEFAULT)
 @click.option("--out", required=True, type=ANY_PATH, help="File to write (.npz).")
 @click.option(
-    "--modes", default=900, show_default=True, type=click.IntRange(min=0), help="Kept beside masters."
+    "--modes", default=1000, show_default=True, type=click.IntRange(min=0), help="Kept beside masters."
 )
 @click.option(
     "--band",
@@ -167,7 +167,7 @@ def _tell_reduced(voice: Voice, reduced: ReducedCasing, out: Path) -> None:
     show_default=True,
     help="Refuse unless valid so far [Hz].",
 )
-@click.option("--sensor", "sensors", multiple=True, help="NAME:X,Y,Z:DIRECTION in metres; repeatable.")
+@click.option("--sensor", "sensors", multiple=True, help=SENSOR_HELP)
 @json_option
 def responses(
     casing: str, out: Path, modes: int, band_hz: float, sensors: tuple[str, ...], json_mode: bool
@@ -204,10 +204,10 @@ def responses(
 def show(casing: str, out: Path, modes: int, mounted: bool, json_mode: bool) -> None:
     """Draw the mesh of CASING and its first elastic modes."""
     from gearsim_bringup.casing_pictures.page import draw_casing
-    from gearsim_sim.model.casing.params import load_casing
+    from gearsim_sim.model.casing.described import load_described
 
     voice = Voice(json_mode=json_mode)
-    params = load_casing(casing)
+    params = load_described(casing)
     with voice.progress() as bar:
         task = bar.add_task("pictures", total=None)
         files, frequencies = draw_casing(

@@ -14,7 +14,7 @@ from gearsim_sim.model.casing.geometry import casing_mesh
 from gearsim_sim.model.casing.reduced import Foot, ReducedCasing, Site, modal_damping
 from gearsim_sim.model.casing.reduction import ACCURACY, Reduction, Tell, craig_bampton
 from gearsim_sim.model.casing.ring_housing import RingHousing, housing_mesh
-from gearsim_sim.model.casing.sites import SitePlace, default_sites, housing_sites, recover_sites, site_nodes
+from gearsim_sim.model.casing.sites import SitePlace, default_sites, recover_sites, site_nodes
 from gearsim_sim.model.casing.structure import MeshedStructure, Structure, assemble, thicknesses_m
 
 MODES = 100  # of the thesis's casing (4.3.2)
@@ -25,8 +25,6 @@ def build_structure(params: Described, *, free: bool = False) -> MeshedStructure
     mesh = housing_mesh(params) if isinstance(params, RingHousing) else casing_mesh(params)
     if free:
         mesh = dataclasses.replace(mesh, pads=())
-    if isinstance(params, RingHousing):
-        return assemble(mesh, params.thicknesses_m, params.material, params.name)
     return assemble(mesh, thicknesses_m(params, mesh.regions), params.material, params.name)
 
 
@@ -52,8 +50,7 @@ def reduce_casing(
     """
     tell("mesh and matrices", 0.0)
     structure = build_structure(params)
-    usual = housing_sites(params) if isinstance(params, RingHousing) else default_sites(params)
-    places = (*usual, *extra_sites)
+    places = (*default_sites(params), *extra_sites)
     reach = params.mesh.plate_size_m
     site_nodes(structure, places, reach)  # a misplaced sensor is told before the work, not after
     reduction = craig_bampton(structure, modes, tell)

@@ -11,15 +11,15 @@ import numpy as np
 import scipy.sparse
 from ruamel.yaml import YAML
 
+from gearsim_sim.model.casing.described import Described
 from gearsim_sim.model.casing.nastran import write_deck
-from gearsim_sim.model.casing.params import CasingParams
 from gearsim_sim.model.casing.sites import default_sites, site_nodes
 from gearsim_sim.model.casing.structure import MeshedStructure, thicknesses_m
 
 DECK_MODES = 106  # six of the free body, and a hundred
 
 
-def write_matrices(structure: MeshedStructure, params: CasingParams, folder: Path) -> list[Path]:
+def write_matrices(structure: MeshedStructure, params: Described, folder: Path) -> list[Path]:
     """Write `stiffness.npz`, `mass.npz` and `casing.yaml`, the description of a user's own matrices.
 
     Sensors are those default sites whose three displacements are independent.
@@ -34,7 +34,7 @@ def write_matrices(structure: MeshedStructure, params: CasingParams, folder: Pat
     return files
 
 
-def write_deck_of(structure: MeshedStructure, params: CasingParams, path: Path) -> Path:
+def write_deck_of(structure: MeshedStructure, params: Described, path: Path) -> Path:
     """Write the casing as a Nastran deck that asks for its first modes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     thickness = thicknesses_m(params, structure.mesh.regions)
@@ -42,7 +42,7 @@ def write_deck_of(structure: MeshedStructure, params: CasingParams, path: Path) 
     return path
 
 
-def _description(structure: MeshedStructure, params: CasingParams) -> Mapping[str, Any]:
+def _description(structure: MeshedStructure, params: Described) -> Mapping[str, Any]:
     places = default_sites(params)
     sensors = {}
     for place, node in zip(places, site_nodes(structure, places, params.mesh.plate_size_m), strict=True):

@@ -1,8 +1,8 @@
 """The mesh of a planetary stage's housing: a cylinder, two end walls with a bore each, two saddles.
 
 x runs across, y upward, z along the shafts, as in the casing of parallel shafts; the origin lies in the
-middle of the ring gear. Masters are `ring` (the ring gear is stiff: the cylinder's seat moves with it as a rigid
-body), `sun` (the bore in the end wall at positive z) and `carrier` (that at negative z).
+middle of the ring gear. Masters are `ring` (the ring gear is stiff: the cylinder's seat moves with it as a
+rigid body), `sun` (the bore in the end wall at positive z) and `carrier` (that at negative z).
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class RingHousing(Strict):
         )
 
     def check(self, where: str) -> None:
-        """InputError unless bores are in their walls, the seat between the saddles, the saddles under it all."""
+        """InputError unless bores are in their walls, the seat between the saddles, these under it all."""
         cylinder, ends, saddles = self.cylinder, self.ends, self.saddles
         widest = cylinder.radius_m - ends.boss_width_m
         limits = (

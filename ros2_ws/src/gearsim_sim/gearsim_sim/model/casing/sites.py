@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -20,15 +21,22 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 @dataclass(frozen=True)
 class SitePlace:
-    """A sensor's name, place [m] and direction (a unit vector)."""
+    """A sensor's name, place [m] and direction (a unit vector); `grid` names its node in place of the place."""
 
     name: str
     position_m: tuple[float, float, float]
     direction: tuple[float, float, float]
+    grid: int | None = None
+    """Number of the node in a deck that `gearsim casing build --deck` writes, from 1."""
 
 
-def default_sites(params: CasingParams) -> tuple[SitePlace, ...]:
-    """Sites that every casing has.
+def default_sites(params: CasingParams | RingHousing) -> tuple[SitePlace, ...]:
+    """Sites that every casing, or every housing, has."""
+    return _housing_sites(params) if isinstance(params, RingHousing) else _box_sites(params)
+
+
+def _box_sites(params: CasingParams) -> tuple[SitePlace, ...]:
+    """Sites of a box.
 
     `b1_x`, `b1_y`, ...: on the ring that holds the bearing, outside and above the bore (in the lumped models
     the pedestal bears these names); `b1_top_y`, ...: on the upper edge above the bearing, where the thesis
@@ -52,12 +60,12 @@ def default_sites(params: CasingParams) -> tuple[SitePlace, ...]:
     return tuple(found)
 
 
-def housing_sites(params: RingHousing) -> tuple[SitePlace, ...]:
-    """Sites that every housing of a planetary stage has.
+def _housing_sites(params: RingHousing) -> tuple[SitePlace, ...]:
+    """Sites of a planetary stage's housing.
 
     `ring_top_y`, `ring_side_x`: on the wall over the ring gear, as on the measured rig (thesis 7.3);
-    `shell_top_y`: on the wall beside it; `sun_end_z`, `carrier_end_z`: on the end walls, half-way between bore
-    and cylinder; `saddle_y`: on the floor's edge of a saddle.
+    `shell_top_y`: on the wall beside it; `sun_end_z`, `carrier_end_z`: on the end walls, half-way between
+    bore and cylinder; `saddle_y`: on the floor's edge of a saddle.
     """
     radius, half = params.cylinder.radius_m, params.cylinder.length_m / 2
     beside = (params.seat.width_m / 2 + half) / 2
@@ -76,13 +84,17 @@ def housing_sites(params: RingHousing) -> tuple[SitePlace, ...]:
 
 
 def parse_site(text: str) -> SitePlace:
-    """A site as people write it: `NAME:X,Y,Z:DIRECTION` in metres; direction x, -y, ... or three numbers."""
-    expected = "NAME:X,Y,Z:DIRECTION as in top:0.05,0.1,0:y"
+    """A site as people write it: `NAME:X,Y,Z:DIRECTION` in metres; direction x, -y, ... or three numbers.
+
+    `NAME:GRID:DIRECTION` takes the node of that number.
+    """
+    expected = "NAME:X,Y,Z:DIRECTION as in top:0.05,0.1,0:y, or a node's number in place of X,Y,Z"
     pieces = text.split(":")
     if len(pieces) != 3 or not pieces[0].strip():
         raise InputError("sensor", "", text, expected)
     name, place, way = (piece.strip() for piece in pieces)
-    position = _three(text, place, expected)
+    grid = int(place) if place.isdecimal() else None
+    position = (math.nan,) * 3 if grid is not None else _three(text, place, expected)
     axis, sign = way.lstrip("+-"), -1.0 if way.startswith("-") else 1.0
     direction = _AXES.get(axis) or _three(text, way, expected)
     scaled = np.array(direction) * (sign if axis in _AXES else 1.0)
@@ -90,7 +102,7 @@ def parse_site(text: str) -> SitePlace:
     if length == 0:
         raise InputError("sensor", name, text, "a direction other than 0,0,0")
     x, y, z = (float(value) for value in scaled / length)
-    return SitePlace(name, position, (x, y, z))
+    return SitePlace(name, position, (x, y, z), grid)
 
 
 def _three(text: str, numbers: str, expected: str) -> tuple[float, float, float]:
@@ -104,19 +116,31 @@ def _three(text: str, numbers: str, expected: str) -> tuple[float, float, float]
 
 
 def site_nodes(structure: MeshedStructure, places: Iterable[SitePlace], reach_m: float) -> list[int]:
-    """Node of each site; InputError if a place is farther than `reach_m` off, or a name used twice."""
+    """Node of each site; InputError if there is none within `reach_m` of a place, or a name is used twice."""
     nodes, names = [], set()
     for place in places:
-        node, distance = structure.mesh.nearest(np.array(place.position_m))
-        if distance > reach_m:
-            at = ", ".join(f"{value:g}" for value in place.position_m)
-            what = f"({at}) m, {1000 * distance:.3g} mm off the nearest node"
-            raise InputError(structure.name, f"sensor {place.name}", what, f"at most {1000 * reach_m:.3g} mm")
+        node = _nearest(structure, place, reach_m) if place.grid is None else _numbered(structure, place)
         if place.name in names:
             raise InputError(structure.name, "sensor", place.name, "each name once")
         names.add(place.name)
         nodes.append(node)
     return nodes
+
+
+def _nearest(structure: MeshedStructure, place: SitePlace, reach_m: float) -> int:
+    node, distance = structure.mesh.nearest(np.array(place.position_m))
+    if distance > reach_m:
+        at = ", ".join(f"{value:g}" for value in place.position_m)
+        what = f"({at}) m, {1000 * distance:.3g} mm off the nearest node"
+        raise InputError(structure.name, f"sensor {place.name}", what, f"at most {1000 * reach_m:.3g} mm")
+    return node
+
+
+def _numbered(structure: MeshedStructure, place: SitePlace) -> int:
+    count = len(structure.mesh.nodes_m)
+    if place.grid is None or not 1 <= place.grid <= count:
+        raise InputError(structure.name, f"sensor {place.name}", f"node {place.grid}", f"1 to {count}")
+    return place.grid - 1
 
 
 def recover_sites(

@@ -13,6 +13,7 @@ from gearsim_io.errors import InputError
 from gearsim_sim.model.casing.material import Array, Material
 from gearsim_sim.model.casing.mesh import Mesh
 from gearsim_sim.model.casing.params import CasingParams
+from gearsim_sim.model.casing.ring_housing import RingHousing
 from gearsim_sim.model.casing.shell import Cells, shell_masses, shell_stiffness
 from gearsim_sim.model.casing.solid import solid_masses, solid_stiffness
 from gearsim_sim.model.casing.ties import rigid_rows, tie_matrix
@@ -65,8 +66,10 @@ class MeshedStructure(Structure):
         return flat[_own_rows(independent)]
 
 
-def thicknesses_m(params: CasingParams, regions: tuple[str, ...]) -> Array:
+def thicknesses_m(params: CasingParams | RingHousing, regions: tuple[str, ...]) -> Array:
     """Thickness of each region: its plate's, unless the description gives it one of its own."""
+    if isinstance(params, RingHousing):
+        return params.thicknesses_m
     for name in params.thickness_m:
         if name not in regions:
             raise InputError(params.name, "thickness", name, f"one of {', '.join(regions)}")
