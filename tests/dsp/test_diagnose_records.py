@@ -41,6 +41,20 @@ WITHOUT_BEARINGS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def diagnosed():
+    """The record and the diagnosis of a file, made once however many tests look at it."""
+    known = {}
+
+    def look(path, machine):
+        if (path, machine) not in known:
+            record = import_file(path, machine)
+            known[path, machine] = record, diagnose_record(record, load_machine(machine))
+        return known[path, machine]
+
+    return look
+
+
 def zoomed_line(x, rate_hz, expected_hz):
     """The envelope's line near a frequency: scipy's filter and Hilbert, whole record, three harmonics,
     fine steps.
@@ -68,10 +82,9 @@ def zoomed_line(x, rate_hz, expected_hz):
 
 
 @pytest.mark.parametrize(("name", "machine", "component", "fault"), FAULTY, ids=[row[0] for row in FAULTY])
-def test_faulty_records(record_file, name, machine, component, fault):
+def test_faulty_records(diagnosed, record_file, name, machine, component, fault):
     plate = load_machine(machine)
-    record = import_file(record_file(name), machine)
-    diagnosis = diagnose_record(record, plate)
+    record, diagnosis = diagnosed(record_file(name), machine)
     assert [(f.component, f.fault) for f in diagnosis.findings] == [(component, fault)]
     assert not diagnosis.healthy
     assert diagnosis.speed.source == "estimated"
@@ -84,28 +97,25 @@ def test_faulty_records(record_file, name, machine, component, fault):
 
 
 @pytest.mark.parametrize(("name", "machine"), HEALTHY, ids=[row[0] for row in HEALTHY])
-def test_healthy_records(record_file, name, machine):
-    record = import_file(record_file(name), machine)
-    diagnosis = diagnose_record(record, load_machine(machine))
+def test_healthy_records(diagnosed, record_file, name, machine):
+    _, diagnosis = diagnosed(record_file(name), machine)
     assert diagnosis.findings == ()
     assert diagnosis.healthy
     assert diagnosis.judged
     assert not any(issue.fatal for issue in diagnosis.quality)
 
 
-def test_inverter_and_supply_lines_of_the_hit_rig_are_named(record_file):
-    record = import_file(record_file("hit_sm/SQ_Normal_1200.mat"), "hit_sq")
-    diagnosis = diagnose_record(record, load_machine("hit_sq"))
+def test_inverter_and_supply_lines_of_the_hit_rig_are_named(diagnosed, record_file):
+    _, diagnosis = diagnosed(record_file("hit_sm/SQ_Normal_1200.mat"), "hit_sq")
     kinds = {issue.issue: issue.detail for issue in diagnosis.quality}
     assert "50 Hz supply" in kinds["electrical_lines"]
     assert "12002" in kinds["inverter_lines"]
 
 
 @pytest.mark.parametrize(("name", "machine", "speed"), WITHOUT_BEARINGS, ids=[r[0] for r in WITHOUT_BEARINGS])
-def test_records_without_bearing_data_run_and_give_no_finding(record_file, name, machine, speed):
-    record = import_file(record_file(name), machine)
+def test_records_without_bearing_data_run_and_give_no_finding(diagnosed, record_file, name, machine, speed):
     plate = load_machine(machine)
-    diagnosis = diagnose_record(record, plate)
+    _, diagnosis = diagnosed(record_file(name), machine)
     assert diagnosis.findings == ()
     # Gears are judged by the angle that is found in the vibration; Gear0's mate is not documented.
     assert diagnosis.judged_parts == (("gears",) if plate.gear_meshes else ())
@@ -117,9 +127,9 @@ def test_records_without_bearing_data_run_and_give_no_finding(record_file, name,
     assert any(told in line for line in diagnosis.lines())
 
 
-def test_json_is_the_contract(record_file):
-    record = import_file(record_file("mfpt/OuterRaceFault_vload_3.mat"), "mfpt")
-    made = json.loads(json.dumps(diagnose_record(record, load_machine("mfpt")).to_json(), allow_nan=False))
+def test_json_is_the_contract(diagnosed, record_file):
+    _, diagnosis = diagnosed(record_file("mfpt/OuterRaceFault_vload_3.mat"), "mfpt")
+    made = json.loads(json.dumps(diagnosis.to_json(), allow_nan=False))
     assert set(made) == {"speed_hz", "quality", "healthy", "findings"}
     assert set(made["speed_hz"]) == {"value", "ci95", "source"}
     low, high = made["speed_hz"]["ci95"]
@@ -155,9 +165,8 @@ def test_half_the_record_and_any_batch_size_give_the_same_verdict(record_file):
     assert [f.fault for f in diagnose_record(half, plate).findings] == ["outer_race"]
 
 
-def test_gear0_tells_the_mesh_that_its_nameplate_does_not_list(record_file):
-    record = import_file(record_file("gear0/3027_217_Data_Chan12.mat"), "gear0")
-    diagnosis = diagnose_record(record, load_machine("gear0"))
+def test_gear0_tells_the_mesh_that_its_nameplate_does_not_list(diagnosed, record_file):
+    _, diagnosis = diagnosed(record_file("gear0/3027_217_Data_Chan12.mat"), "gear0")
     (mesh,) = [q for q in diagnosis.quality if q.issue == "unlisted_mesh"]
     # 23 teeth at 2000 rpm pass at 766.7 Hz (README of the data set); the line is that of an FFT.
     assert mesh.channel == "ch12"
@@ -168,8 +177,10 @@ def test_gear0_tells_the_mesh_that_its_nameplate_does_not_list(record_file):
     assert "lists neither bearings nor pairs of gears" in diagnosis.lines()[-1]
 
 
-def test_measured_records_are_not_said_to_be_sampled_wrongly_nor_to_have_unlisted_gears(record_file):
-    for name, machine, *_ in (*FAULTY[::3], *HEALTHY, *WITHOUT_BEARINGS[1:]):
-        diagnosis = diagnose_record(import_file(record_file(name), machine), load_machine(machine))
+def test_measured_records_are_not_said_to_be_sampled_wrongly_nor_to_have_unlisted_gears(
+    diagnosed, record_file
+):
+    for name, machine, *_ in (*FAULTY, *HEALTHY, *WITHOUT_BEARINGS[1:]):
+        _, diagnosis = diagnosed(record_file(name), machine)
         kinds = {q.issue for q in diagnosis.quality}
         assert not kinds & {"sampling_rate_doubtful", "unlisted_mesh"}, name

@@ -113,3 +113,11 @@ def test_an_outer_race_that_drifts_is_no_inner_race():
     rng = np.random.default_rng(4)
     x = 1.5 * defect(rng, turns, RATE, 4.003, slip=0.0).x + noise(rng, turns.size)
     assert drifting_races(_measured(x, turns, _plate(5.997))) == ()
+
+
+def test_what_swings_by_less_than_impacts_do_is_not_told():
+    """In nine times the noise the same drift is still sure, of half of what a swing of full depth may be."""
+    turns = turns_of(SPEED, 4.0, RATE)
+    x = _once_a_turn(np.random.default_rng(3), turns, 6.003)
+    more = x + 8.0 * noise(np.random.default_rng(6), turns.size)
+    assert drifting_races(_measured(more, turns, _plate(6.003))) == ()

@@ -16,7 +16,7 @@ _SAME_SPEED = 1e-6
 _CLEARLY_ITS_OWN = 3.0
 # What a shaft that shakes its wheel looks like to the judge of gears.
 _SHAKEN_GEARS = ("gear_eccentricity", "gear_wear")
-_CRACK_BY_ENCODERS = "transmission error"
+_BY_ENCODERS = "transmission error"
 _TOOTH_FAULTS = ("gear_tooth_crack", "gear_tooth_spall", "planet_tooth_crack", "planet_tooth_spall")
 
 
@@ -34,23 +34,31 @@ def all_findings(measured: Measured, bearings: tuple[Finding, ...]) -> tuple[Fin
     Strong impacts of one tooth, once a turn, fill the envelope with the shaft's lines; what a bearing is then
     said to have at a multiple of that speed, or of half of it, is the tooth. A bad tooth also raises the
     unevenness by which wear is judged; the gear judge sees to that itself. So do the impacts of a bearing:
-    beside one that is told nothing is said of wear.
+    beside one that is told nothing is said of wear. And as a large spall of an inner race passes the loaded
+    zone the shaft yields, at one angle of every turn, which two encoders cannot tell from a soft tooth.
+    Where a shaft shakes, teeth part and meet at angles that move, as a race's impacts do.
     """
     others = judge_all(measured)
-    bearings = bearings or drifting_races(measured)
+    shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
+    bearings = bearings or (() if shaken else drifting_races(measured))
     teeth = [one for one in others if one.fault in _TOOTH_FAULTS]
     kept = [one for one in bearings if not any(_is_teeths_doing(one, tooth, measured) for tooth in teeth)]
-    shaken = any(one.fault in ("unbalance", "misalignment", "looseness") for one in others)
-    knocked = any(one.confidence >= LEAST_CONFIDENCE for one in kept)
-    others = tuple(one for one in others if not (knocked and one.fault == "gear_wear"))
+    told = [one for one in kept if one.confidence >= LEAST_CONFIDENCE]
+    others = tuple(one for one in others if not (told and one.fault == "gear_wear"))
+    yields = any(one.fault == "inner_race" and one.severity == "severe" for one in told)
+    others = tuple(one for one in others if not (yields and _is_tooth_by_encoders(one)))
     kept += [one for one in others if not (shaken and _is_shaken(one))]
     return tuple(sorted(kept, key=lambda one: -one.confidence))
 
 
 def _is_shaken(finding: Finding) -> bool:
     """What only looks like a fault of gears: a wheel that is shaken moves along the line of action, too."""
-    by_encoders = finding.evidence.get("witness") == _CRACK_BY_ENCODERS
+    by_encoders = _is_tooth_by_encoders(finding)
     return finding.fault in _SHAKEN_GEARS or (by_encoders and finding.fault == "gear_tooth_crack")
+
+
+def _is_tooth_by_encoders(finding: Finding) -> bool:
+    return finding.fault in _TOOTH_FAULTS and finding.evidence.get("witness") == _BY_ENCODERS
 
 
 def _is_teeths_doing(bearing: Finding, tooth: Finding, measured: Measured) -> bool:
