@@ -224,6 +224,25 @@ def test_descriptions_that_do_not_fit_are_told(changes, told, tmp_path):
         reduce(path)
 
 
-def test_more_modes_than_displacements_are_refused(tmp_path):
-    with pytest.raises(InputError, match="modes: got 90, expected fewer than 83"):
+def test_more_modes_than_there_can_be_are_refused(tmp_path):
+    with pytest.raises(InputError, match="modes: got 90, expected at most 82"):
         reduce(write(tmp_path), modes=90)
+    # As in models whose rotations have no inertia.
+    half = scipy.sparse.csc_array(
+        scipy.sparse.diags_array(np.where(np.arange(90) < 6, 1.0, np.arange(90) % 2))
+    )
+    assert reduce(write(tmp_path, mass=half), modes=40).modes == 40
+    with pytest.raises(InputError, match="modes: got 41, expected at most 40"):
+        reduce(write(tmp_path, mass=half), modes=41)
+
+
+def test_masters_that_leave_nothing_are_refused(tmp_path):
+    masters = {f"m{k}": {"rows": list(range(6 * k, 6 * k + 6)), "position": ["0 m"] * 3} for k in range(15)}
+    with pytest.raises(InputError, match="masters: got 0 of 90 displacements with mass beside"):
+        reduce(write(tmp_path, masters=masters), modes=0)
+
+
+def test_a_band_beyond_all_modes_is_told(tmp_path):
+    path = write(tmp_path)
+    with pytest.raises(InputError, match=r"modes: got 10 \(valid up to .*, expected more than there are dis"):
+        reduce_description(str(path), 10, (), 1e5, lambda _step, _done: None)

@@ -86,9 +86,11 @@ def finish(
     modes = len(reduction.mass) - len(reduction.held)
     if band_hz is not None and reduction.valid_hz < band_hz:
         # The number of modes of plates grows in proportion to frequency.
-        about_modes = int(np.ceil(1.1 * modes * band_hz / reduction.valid_hz))
+        needed = int(np.ceil(1.1 * max(modes, 1) * band_hz / max(reduction.valid_hz, 1.0)))
+        enough = needed < structure.size - len(reduction.held)
+        expected = f"about {needed}" if enough else "more than there are displacements"
         what = f"{modes} (valid up to {reduction.valid_hz:.0f} Hz)"
-        raise InputError(structure.name, "modes", what, f"about {about_modes} for {band_hz:g} Hz")
+        raise InputError(structure.name, "modes", what, f"{expected} for {band_hz:g} Hz")
     return ReducedCasing(
         name=structure.name,
         masters=reduction.masters,

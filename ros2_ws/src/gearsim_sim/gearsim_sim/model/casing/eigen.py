@@ -41,7 +41,8 @@ def lowest_modes(
     factor = factor or factorise(csc_array(stiffness - shift * mass))
     inverse = LinearOperator((size, size), matvec=factor.solve, dtype=np.float64)
     start = np.random.default_rng(SEED).standard_normal(size)
-    vectors = min(size - 1, 2 * count + 20)
+    # Displacements without mass add no direction to the search.
+    vectors = min(size - 1, int(np.sum(mass.diagonal() > 0)), 2 * count + 20)
     squares, shapes = eigsh(
         stiffness,
         k=count,

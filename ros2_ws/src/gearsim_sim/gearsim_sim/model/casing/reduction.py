@@ -112,25 +112,37 @@ def craig_bampton(
     Raises
     ------
     InputError
-        If the structure has mechanisms with its masters held, or fewer displacements than modes asked for.
+        If the structure has mechanisms with its masters held, or fewer displacements with mass than modes
+        asked for.
     """
     held = np.concatenate(list(structure.masters.values()))
     others = np.setdiff1d(np.arange(structure.size), held)
-    if not 0 <= modes < len(others) - 1:
-        raise InputError(structure.name, "modes", modes, f"fewer than {len(others) - 1}")
     parts = _Parts(structure, held, others)
+    most = _most_modes(structure, parts)
+    if not 0 <= modes <= most:
+        raise InputError(structure.name, "modes", modes, f"at most {most}")
     tell("factor of the stiffness", 0.0)
     factor = held_factor(parts.k_ss, structure.name, others)
     tell("static shapes", 0.15)
     static = -factor.solve(parts.k_sm)
     tell("modes", 0.2)
-    found = min(modes + 1 + int(np.ceil(BEYOND * modes)), len(others) - 1)
+    found = min(modes + int(np.ceil(BEYOND * modes)), most) + 1
     squares, shapes = sliced_modes(parts.k_ss, parts.m_ss, found, factor=factor)
     tell("residual vectors", 0.9)
     work = _Work(parts, static, modes, squares, shapes, factor)
     counts = range(0, min(len(held), modes // 2) + 1, 2) if residuals is None else (residuals,)
     best = max((work.choice(count) for count in counts), key=lambda choice: choice.valid)
     return work.finish(structure, held, others, best)
+
+
+def _most_modes(structure: Structure, parts: _Parts) -> int:
+    """How many modes can be kept: one more must be found, and displacements without mass add none."""
+    # The solver finds fewer than there are.
+    most = int(np.sum(parts.m_ss.diagonal() > 0)) - 2
+    if most < 0:
+        what = f"{most + 2} of {structure.size} displacements with mass beside those of the masters"
+        raise InputError(structure.name, "masters", what, "two or more")
+    return most
 
 
 @dataclass(frozen=True)

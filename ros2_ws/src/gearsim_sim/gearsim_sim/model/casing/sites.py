@@ -21,7 +21,7 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 @dataclass(frozen=True)
 class SitePlace:
-    """A sensor's name, place [m] and direction (a unit vector); `grid` names its node in place of the place."""
+    """A sensor's name, place [m] and direction (a unit vector); `grid` stands for a place."""
 
     name: str
     position_m: tuple[float, float, float]
@@ -131,7 +131,7 @@ def _nearest(structure: MeshedStructure, place: SitePlace, reach_m: float) -> in
     node, distance = structure.mesh.nearest(np.array(place.position_m))
     if distance > reach_m:
         at = ", ".join(f"{value:g}" for value in place.position_m)
-        what = f"({at}) m, {1000 * distance:.3g} mm off the nearest node"
+        what = f"({at}) m, {1000 * distance:.0f} mm off the nearest node"
         raise InputError(structure.name, f"sensor {place.name}", what, f"at most {1000 * reach_m:.3g} mm")
     return node
 
