@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearsim_bringup.cli import BAD_INPUT, main
+from gearsim_sim.frf.file import load_responses
 from gearsim_sim.model.casing.reduced import find_reduced, load_reduced
 
 
@@ -39,6 +41,46 @@ def test_sensors_anywhere_come_into_the_file(coarse, tmp_path, capsys):
     assert "lid" in capsys.readouterr().out
     site = load_reduced(file).site("lid")
     assert site.direction == (0.0, 1.0, 0.0)
+    assert main(["casing", "build", coarse, "--deck", str(tmp_path / "c.bdf")]) == 0
+    cards = (tmp_path / "c.bdf").read_text().split("GRID*")[1:]
+    near = [card for card in cards if abs(_place(card) - np.array(site.position_m)).max() < 1e-6]
+    number = near[0][:20].split()[0]
+    numbered = ["--sensor", f"again:{number}:0,2,0"]
+    assert main(["casing", "reduce", coarse, "--modes", "10", *numbered, "--out", str(file)]) == 0
+    again = load_reduced(file).site("again")
+    assert again.position_m == site.position_m
+    assert np.array_equal(again.rows, site.rows)
+
+
+def _place(card: str) -> np.ndarray:
+    """Coordinates of a node in a deck, from its card of large fields."""
+    first, second = (line.ljust(80) for line in card.splitlines()[:2])
+    return np.array([float(first[35:51]), float(first[51:67]), float(second[8:24])])
+
+
+def test_responses_are_made_from_a_description_and_from_a_reduced_casing(coarse, tmp_path, capsys):
+    reduced, own, again = (tmp_path / name for name in ("reduced.npz", "own.npz", "again.npz"))
+    sensor = ["--sensor", "lid:0,0.095,0.06:y"]
+    assert main(["casing", "reduce", coarse, "--modes", "40", *sensor, "--out", str(reduced)]) == 0
+    few = ["--modes", "40", "--band", "1000"]
+    assert main(["casing", "responses", coarse, *few, *sensor, "--out", str(own)]) == 0
+    told = capsys.readouterr().out
+    assert "b1_x, b1_y, b2_x" in told
+    assert "lid" in told
+    assert main(["casing", "responses", str(reduced), "--band", "1000", "--out", str(again), "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["sensors"][-1] == "lid"
+    lines = np.array([100.0, 1000.0])
+    both = [load_responses(file).accelerances(lines) for file in (own, again)]
+    assert np.allclose(*both, rtol=1e-6, atol=1e-9 * np.abs(both[0]).max())
+    for arguments, message in (
+        ([str(reduced), "--band", "9000"], "a reduction valid to 9000 Hz"),
+        ([str(reduced), *sensor, "--band", "1000"], "gearsim casing reduce"),
+        ([str(own)], "as `gearsim casing reduce` writes it"),
+    ):
+        assert main(["casing", "responses", *arguments, "--out", str(tmp_path / "no.npz")]) == BAD_INPUT
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "no.npz").exists()
 
 
 @pytest.mark.parametrize(
@@ -49,6 +91,7 @@ def test_sensors_anywhere_come_into_the_file(coarse, tmp_path, capsys):
         (["reduce", "--out", "none/x.npz"], "folder that exists"),
         (["reduce", "--out", "x.npz", "--sensor", "far:9,9,9:y"], "sensor far"),
         (["reduce", "--out", "x.npz", "--sensor", "far"], "NAME:X,Y,Z:DIRECTION"),
+        (["reduce", "--out", "x.npz", "--sensor", "far:0:y"], "sensor far: got node 0, expected 1 to"),
         (["reduce", "--out", "x.npz", "--modes", "-1"], "--modes"),
         (["reduce", "--out", "x.npz", "--modes", "8", "--band", "4000"], "valid up to"),
         (["check", "none.yaml"], "no such file"),

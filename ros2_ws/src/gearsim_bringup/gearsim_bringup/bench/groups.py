@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from gearsim_bringup.bench import alarms, bags, dsp, monitors, setup, sim, stream
+from gearsim_bringup.bench import alarms, bags, casing, dsp, monitors, setup, sim, stream
 from gearsim_bringup.bench.figure import Figure
 from gearsim_bringup.ui import Voice
 
@@ -15,7 +15,8 @@ GROUPS: dict[str, Callable[[Voice], Iterable[Figure]]] = {
     "alarms": alarms.measure,
     "stream": stream.measure,
     "monitors": monitors.measure,
+    "casing": casing.measure,
     "setup": setup.measure,
 }
-# `setup` needs the package index and minutes; it is run when asked for.
+# `casing` takes minutes, `setup` those and the package index; they are run when asked for.
 DEFAULT = ("sim", "dsp", "bags", "alarms", "stream", "monitors")

@@ -25,7 +25,7 @@ EXAMPLE = """
 
 @click.command("bench", epilog=example(EXAMPLE))
 @click.option(
-    "--only", "groups", multiple=True, help="Group of figures, repeatable (default: all but setup)."
+    "--only", "groups", multiple=True, help="Group, repeatable (default: all but casing and setup)."
 )
 @click.option(
     "--peers", is_flag=True, help="Install other programs (ROSS) beside this one first, to be measured too."
@@ -75,7 +75,8 @@ def command(
 ) -> int:
     """Measure what the project promises: every figure as a ratio to a baseline of the same run.
 
-    Groups: sim, dsp, bags, alarms, stream, and setup, which clones the project and sets it up anew.
+    Groups: sim, dsp, bags, alarms, stream, casing, which takes minutes, and setup, which clones the project
+    and sets it up anew.
     """
     if blind is not None:
         voice = Voice(json_mode=json_mode)

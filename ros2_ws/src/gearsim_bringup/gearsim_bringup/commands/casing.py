@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from gearsim_sim.model.casing.reduction import Tell
 
 DEFAULT = "unsw_casing"
+IN_MACHINE = "unsw_casing_updated"  # of the shipped gearbox
+SENSOR_HELP = "NAME:X,Y,Z:DIRECTION in metres, or a node's number (--deck) for X,Y,Z; repeatable."
 GROUP_EXAMPLE = """
 ./gearsim casing check
 ./gearsim casing reduce --out out/casing.npz
@@ -154,7 +156,7 @@ def _tell_reduced(voice: Voice, reduced: ReducedCasing, out: Path) -> None:
 
 
 @command.command("responses", epilog=example(RESPONSES_EXAMPLE))
-@click.argument("casing", default=DEFAULT)
+@click.argument("casing", default=IN_MACHINE)
 @click.option("--out", required=True, type=ANY_PATH, help="File to write (.npz).")
 @click.option(
     "--modes", default=1000, show_default=True, type=click.IntRange(min=0), help="Kept beside masters."

@@ -13,8 +13,6 @@ from gearsim_sim.model.casing.reduced import load_reduced
 if TYPE_CHECKING:
     from gearsim_sim.model.casing.reduction import Tell
 
-MODES = 900  # of the shipped casing: to 25 kHz
-
 
 def make_responses(
     name_or_path: str, modes: int, sensors: Sequence[str], band_hz: float | None, tell: Tell

@@ -1,9 +1,9 @@
-"""A gear pair on two shafts in ROSS, 36 degrees of freedom: run by the peers' Python, prints a JSON object.
+"""A gear pair on two shafts in ROSS, 36 and 156 degrees of freedom: run by the peers' Python, prints JSON.
 
-Three nodes of six degrees of freedom on each shaft, a gear in the middle, a linear bearing at each end;
-masses and stiffnesses are near those of the 34-DOF gearbox. Newmark's method at 65536 Hz, the processor
-time per simulated second, with a constant mesh stiffness and with one that alternates between one and two
-pairs of teeth.
+Three or thirteen nodes of six degrees of freedom on each shaft, a gear in the middle, a linear bearing at
+each end; masses and stiffnesses are near those of the 34-DOF gearbox. Newmark's method at 65536 Hz, the
+processor time per simulated second, with a constant mesh stiffness and, for the small pair, with one that
+alternates between one and two pairs of teeth.
 """
 
 import json
@@ -16,26 +16,33 @@ RATE_HZ, SPEED_RAD_S = 65536, 2 * np.pi * 10
 MESH_N_PER_M = 3e8
 
 
-def shaft() -> list[ross.ShaftElement]:
-    """Two elements of a shaft of 25 mm."""
-    return [ross.ShaftElement(L=0.15, idl=0.0, odl=0.025, material=ross.materials.steel) for _ in range(2)]
+def shaft(elements: int) -> list[ross.ShaftElement]:
+    """Elements of a shaft of 25 mm."""
+    steel = ross.materials.steel
+    return [ross.ShaftElement(L=0.3 / elements, idl=0.0, odl=0.025, material=steel) for _ in range(elements)]
 
 
-def rotor(teeth: int, diameter_m: float) -> ross.Rotor:
+def rotor(teeth: int, diameter_m: float, elements: int) -> ross.Rotor:
     """A gear between two bearings."""
     gear = ross.GearElement(
-        n=1, m=2.0, Id=0.002, Ip=0.004, n_teeth=teeth, pitch_diameter=diameter_m, pr_angle=np.radians(20)
+        n=elements // 2,
+        m=2.0,
+        Id=0.002,
+        Ip=0.004,
+        n_teeth=teeth,
+        pitch_diameter=diameter_m,
+        pr_angle=np.radians(20),
     )
-    bearings = [ross.BearingElement(n=n, kxx=1.5e8, kyy=1.5e8, cxx=1.4e3) for n in (0, 2)]
-    return ross.Rotor(shaft(), [gear], bearings)
+    bearings = [ross.BearingElement(n=n, kxx=1.5e8, kyy=1.5e8, cxx=1.4e3) for n in (0, elements)]
+    return ross.Rotor(shaft(elements), [gear], bearings)
 
 
-def seconds_per_second(steps: int, *, varying: bool) -> tuple[int, float]:
+def seconds_per_second(steps: int, *, varying: bool, elements: int = 2) -> tuple[int, float]:
     """Degrees of freedom, and processor time for a simulated second."""
     pair = ross.MultiRotor(
-        rotor(32, 0.064),
-        rotor(80, 0.160),
-        coupled_nodes=(1, 1),
+        rotor(32, 0.064, elements),
+        rotor(80, 0.160, elements),
+        coupled_nodes=(elements // 2, elements // 2),
         gear_mesh_stiffness=MESH_N_PER_M,
         update_mesh_stiffness=varying,
         square_varying_stiffness=varying,
@@ -53,4 +60,6 @@ if __name__ == "__main__":
     seconds_per_second(10, varying=False)  # what is only done once
     dof, constant = seconds_per_second(1000, varying=False)
     _, varied = seconds_per_second(300, varying=True)
-    print(json.dumps({"dof": dof, "constant_s": constant, "varying_s": varied}))
+    large_dof, large = seconds_per_second(300, varying=False, elements=12)
+    told = {"dof": dof, "constant_s": constant, "varying_s": varied}
+    print(json.dumps({**told, "large_dof": large_dof, "large_s": large}))
