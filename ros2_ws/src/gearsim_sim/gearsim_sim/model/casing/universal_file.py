@@ -174,8 +174,8 @@ def _responses(
     pairs = [[(b, a) if swapped else (a, b) for b in points] for a in references]
     lacking = [pair for row in pairs for pair in row if pair not in table]
     if lacking:
-        first = " to ".join(str(end) for end in lacking[0])
-        what = f"{len(lacking)} of {len(references)} x {len(points)} missing (first {first})"
+        example = " to ".join(str(end) for end in lacking[0])
+        what = f"{len(lacking)} of {len(references)} x {len(points)} missing (first {example})"
         raise InputError(where, "frequency responses", what, "one for each point and reference")
     whole = np.array([[table[pair] for pair in row] for row in pairs])
     # From 0 Hz on, as those who identify want it; what lies below the band is not looked at.
