@@ -110,3 +110,22 @@ def test_the_worst_comes_first():
     found = doubts([5.0, 0.0, 0.0, -8.0, 0.0, 0.0])
     assert [each.id for each in found] == ["g1", "g2"]
     assert np.allclose([each.z for each in found], [-8.0, 5.0])
+
+
+def cages(monkeypatch, training, heldout):
+    """Two contexts whose records tell these deviations of a cage, each known to 0.0002."""
+    from gearsim_twin.causes import cage_motion
+
+    def told(context, component):
+        return [cage_motion.Deviation(0, component, x, 2e-4, None, 100.0, 0.0) for x in context]
+
+    monkeypatch.setattr(cage_motion, "deviations", told)
+    return cage_motion.cage_nats(training, heldout, "bearing", lambda _: -1e-3)
+
+
+def test_lines_out_of_place_again_speak_for_a_cage_by_their_standard_deviations(monkeypatch):
+    """log of N(x; -0.001, s) / N(x; 0, s) is 12.5 for x = -0.001, s = 0.0002, and falls as x nears 0."""
+    assert cages(monkeypatch, [-7e-4], [-6e-4]) == pytest.approx(5.0 + 2.5)
+    assert cages(monkeypatch, [-1e-3], [-4e-4]) == 0.0  # nearer to nothing than to what is stated
+    assert cages(monkeypatch, [-1e-3], []) == 0.0
+    assert cages(monkeypatch, [-2e-3], [-2e-3]) == 15.0  # however sure, not beyond what errors allow

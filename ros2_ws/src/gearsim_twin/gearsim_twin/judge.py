@@ -122,7 +122,9 @@ class Bench:
 
     def _chance(self, numbers: Sequence[int], training: int, plan: Plan) -> dict[int, Realisations]:
         """What chance does to each record: that of the record for training with the most similar speed."""
-        seeds = range(self.settings.seed, self.settings.seed + self.settings.seeds)
+        geared = self.case.machine.gear_meshes or self.case.machine.planetary_stages
+        number = self.settings.gear_seeds if geared else self.settings.seeds
+        seeds = range(self.settings.seed, self.settings.seed + number)
         jobs = [(numbers[k], self.nominal[numbers[k]], seed) for k in range(training) for seed in seeds]
         found = self.simulator.seeded(jobs, partial(features, plan=plan), self.seconds)
         rows = [found[k * len(seeds) : (k + 1) * len(seeds)] for k in range(training)]
@@ -161,6 +163,9 @@ class Bench:
         contents = {bench.numbers[k]: trial.model.content(bench.nominal[k]) for k in records}
         shown = [trial.features[k] for k in records]
         tau = prior.tau_of(bench.stack.domains)
+        # Of records for training that the search does not look at positions of lines are read all the same.
+        training = range(len(self.case.training)) if records == bench.training else ()
+        more = [k for k in training if k not in contents]
         plain = tuple(
             _simulated(self.simulator, k, content, self.settings) for k, content in contents.items()
         )
@@ -172,9 +177,12 @@ class Bench:
             comparison=tuple(compare(bench.measured[k], trial.features[k], tau) for k in records),
             contents=tuple(contents.values()),
             simulated_views=plain,
+            more_views=tuple(self.views[k] for k in more),
+            more_contents=tuple(trial.model.content(self.nominal[k]) for k in more),
             noisy_views=tuple(
                 heard(view, trial.nuisance[0], self.settings.seed + k) for k, view in enumerate(plain)
             ),
+            gains_db=trial.nuisance[0].gains_db,
         )
 
 

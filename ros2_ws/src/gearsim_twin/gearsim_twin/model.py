@@ -21,7 +21,7 @@ READ = "std:"
 """Before the name of a parameter in a start: the standard deviation with which it was read off the records.
 
 Such a parameter is not fitted by simulation."""
-# A reading is chosen among some hundred places that can be told apart.
+# A reading is chosen among some hundred places that can be told apart, however sharp it is itself.
 _MOST_READING_NATS = 5.0
 
 
@@ -56,7 +56,7 @@ class Extension:
                 value, std = (float(self.values[key]) for key in (parameter.name, f"{READ}{parameter.name}"))
                 u = parameter.prior.coordinate(value)
                 width = parameter.prior.coordinate(value + std) - parameter.prior.coordinate(value - std)
-                cost += min(0.5 * u * u - math.log(max(0.5 * width, 1e-9)), _MOST_READING_NATS)
+                cost += 0.5 * u * u + min(-math.log(max(0.5 * width, 1e-9)), _MOST_READING_NATS)
         return max(cost, 0.0)
 
     def at(self, coordinates: tuple[float, ...]) -> Extension:

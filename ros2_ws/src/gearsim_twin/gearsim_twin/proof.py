@@ -3,6 +3,9 @@
 Some causes leave what nothing else does: samples that stop at one value, words that are lost, lines of the
 supply. Their finders have false alarm rates of their own, and much of what they find shows in no level. Such
 a cause is proven when it is found again, alike, in records that it was not read from.
+
+Where lines are is known far better than how high they should be, and kinematics do not err as levels do. So
+causes that move lines tell themselves by how much what they read off positions speaks for them.
 """
 
 from __future__ import annotations
@@ -38,6 +41,9 @@ def proof_nats(extension: Extension, heldout: Context) -> float:
     What reading its numbers has cost is given back: the second reading had no choice.
     """
     cause = extension.cause
+    told = getattr(cause, "told_again", None)
+    if told is not None:
+        return float(told(extension.values, extension.context, heldout))
     if extension.free or not getattr(cause, "proven", False) or not cause.applies(heldout):
         return 0.0
     again = any(_alike(extension, start) for start in cause.starts(heldout))
@@ -46,12 +52,19 @@ def proof_nats(extension: Extension, heldout: Context) -> float:
 
 def with_proofs(extensions: Sequence[Extension], heldout: Callable[[], Context]) -> list[float]:
     """`proof_nats` of some extensions; the held-out records are looked at only if one of them asks for it."""
-    wanted = [not each.free and bool(getattr(each.cause, "proven", False)) for each in extensions]
+    wanted = [_asks(each) for each in extensions]
     if not any(wanted):
         return [0.0] * len(extensions)
     context = heldout()
     pairs = zip(extensions, wanted, strict=True)
     return [proof_nats(each, context) if asked else 0.0 for each, asked in pairs]
+
+
+def _asks(extension: Extension) -> bool:
+    cause = extension.cause
+    if getattr(cause, "told_again", None) is not None:
+        return True
+    return not extension.free and bool(getattr(cause, "proven", False))
 
 
 def _alike(extension: Extension, start: Values) -> bool:

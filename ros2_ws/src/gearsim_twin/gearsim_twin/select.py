@@ -106,7 +106,7 @@ def select(
     tentative = False
     while len(choices) < settings.most_causes:
         context = context_of(current.trial)
-        if choices and content(context):
+        if choices and content(context) and not _left_over(rounds[-1], choices, settings):
             break
         done, yard, current = _round(
             search, yard, current, {choice.key for choice in choices}, rounds, context
@@ -129,6 +129,18 @@ def select(
             break
     yard, current, choices = certain
     return Selection(tuned, current, tuple(choices), tuple(rounds), yard)
+
+
+def _left_over(done: Round, choices: list[Choice], settings: Settings) -> bool:
+    """Whether a round had a convincing cause besides the one taken, which that one need not explain too."""
+    taken = {choice.key for choice in choices}
+    instead = {name for choice in choices for name, _ in choice.candidate.extension.cause.confused_with}
+    return any(
+        each.lead_nats > settings.convincing_nats
+        and each.extension.key not in taken
+        and each.extension.cause.name not in instead | {name for name, _ in taken}
+        for each in done.candidates
+    )
 
 
 def _round(
@@ -229,11 +241,12 @@ def _held_out(
     for k, each in enumerate(near):
         gain = gain_between(search.bench, yard, current, each.fitted, search.settings.seed + number)
         found[k] = replace(each, gain=gain)
-    passed = (
-        k
+    passed = {
+        # Evidence of the training records, and what that predicts of the others: together that of all.
+        k: each.lead_nats + each.gain.nats
         for k, each in enumerate(found)
         if each.lead_nats > least
         and each.gain is not None
         and each.holds(each.gain, search.settings.trifle_db)
-    )
-    return found, next(passed, None)
+    }
+    return found, max(passed, key=lambda k: passed[k], default=None)

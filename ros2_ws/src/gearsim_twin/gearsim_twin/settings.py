@@ -40,6 +40,9 @@ class Settings:
         Fall of the held-out rms error in the affected domain below which it is not worth a cause.
     seeds : int
         Machines of a kind that are simulated to learn what chance does.
+    gear_seeds : int
+        The same of machines with gears: teeth wrong at random scatter some lines by 6 dB and others not at
+        all, and four machines do not tell which.
     most_seconds : float
         Longest simulation, unless lines of the machine need longer to be told apart.
     seed : int
@@ -60,6 +63,7 @@ class Settings:
     hint_nats: float = -2.5
     trifle_db: float = 0.02
     seeds: int = 4
+    gear_seeds: int = 10
     most_seconds: float = 3.0
     seed: int = 1
     workers: int = 1

@@ -13,7 +13,14 @@ import numpy as np
 
 from gearsim_twin.causes.bearing_model import seat_of
 from gearsim_twin.causes.bearing_signs import signs_of
-from gearsim_twin.causes.cage_motion import SLIP_OR_GEOMETRY, Deviation, deviations, movable, united_std
+from gearsim_twin.causes.cage_motion import (
+    SLIP_OR_GEOMETRY,
+    Deviation,
+    cage_nats,
+    deviations,
+    movable,
+    united_std,
+)
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_parameter
 from gearsim_twin.causes.prior import Normal
@@ -37,7 +44,7 @@ class BearingGeometry:
 
     name = "bearing_geometry"
     parameters: tuple[Parameter, ...] = (
-        Parameter("diameter_ratio_change", "1", Normal(0.0, 0.04, -_MOST_CHANGE, _MOST_CHANGE), step=0.004),
+        Parameter("diameter_ratio_change", "1", Normal(0.0, 0.02, -_MOST_CHANGE, _MOST_CHANGE), step=0.004),
     )
     confused_with: tuple[tuple[str, str], ...] = (
         ("cage_slip", SLIP_OR_GEOMETRY),
@@ -74,6 +81,17 @@ class BearingGeometry:
         widest = _ROOM * 2 * law.pitch_radius_m * math.sin(math.pi / elements)
         diameter = min(2 * law.ball_radius_m * factor, widest)
         return with_parameter(content, f"{place}.{_DIAMETER}", diameter, "m")
+
+    def told_again(self, values: Values, context: Context, heldout: Context) -> float:
+        """Nats by which positions of lines speak for it, in records for training and in those held out."""
+        component = str(values["component"])
+        if values["told"] != _DIAMETER:
+            return 0.0
+        law = seat_of(context.contents[0], component).law
+        turning = -1.0 if context.case.machine.bearing(component).outer_ring_rotates else 1.0
+        gamma = law.gamma * (1.0 + float(values["diameter_ratio_change"]))
+        share = (1.0 - turning * gamma) / (1.0 - turning * law.gamma) - 1.0
+        return cage_nats(context, heldout, component, lambda _: share)
 
     def signature(self, values: Values) -> str:
         """In plain words."""

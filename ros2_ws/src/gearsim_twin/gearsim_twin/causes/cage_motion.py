@@ -15,7 +15,7 @@ their cage.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,7 @@ __all__ = [
     "CageMotion",
     "Deviation",
     "cage_motion",
+    "cage_nats",
     "deviations",
     "model_share",
     "model_spin",
@@ -55,6 +56,8 @@ _LEAST_SPEED_ERROR = 2e-5
 # Below this part of the strongest sign, lines may be others' (third-order combinations of the strongest).
 _TRUSTED = 0.1
 _BALL_TRUSTED = 0.2
+# However well positions are told, a systematic error of theirs is possible once in so many cases.
+_MOST_NATS = 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +205,8 @@ def united_std(values: NDArray[np.float64], std: NDArray[np.float64]) -> float:
 def deviations(context: Context, component: str) -> list[Deviation]:
     """By how much the cage is off the model, in every record that tells it."""
     found = []
-    for record, (view, content) in enumerate(zip(context.views, context.contents, strict=True)):
+    views, contents = (*context.views, *context.more_views), (*context.contents, *context.more_contents)
+    for record, (view, content) in enumerate(zip(views, contents, strict=True)):
         motion = cage_motion(view, component)
         if motion is not None:
             turns = view.machine.bearing(component).outer_ring_rotates
@@ -211,3 +215,34 @@ def deviations(context: Context, component: str) -> list[Deviation]:
             force, spin = force_n(content, component), model_spin(content, component)
             found.append(Deviation(record, component, off, std, motion, force, spin))
     return found
+
+
+def cage_nats(
+    context: Context, heldout: Context, component: str, share_of: Callable[[float], float]
+) -> float:
+    """By how much positions of lines speak for a cage that is off the model, in nats.
+
+    Parameters
+    ----------
+    context, heldout : Context
+        Of the records for training and of those held out, beside the model with the cage where it was.
+    component : str
+    share_of : callable
+        Relative deviation of c (below 0: slower) that is stated, by the radial force on the bearing [N].
+
+    Returns
+    -------
+    float
+        0 where the records held out speak against it, or say nothing.
+    """
+    told = [
+        [_speaks(one, share_of(one.force_n)) for one in deviations(each, component)]
+        for each in (context, heldout)
+    ]
+    again = sum(told[1])
+    return min(sum(told[0]) + again, _MOST_NATS) if again > 0.0 else 0.0
+
+
+def _speaks(one: Deviation, share: float) -> float:
+    """Log likelihood of a stated deviation less that of none."""
+    return 0.5 * ((one.share / one.std) ** 2 - ((one.share - share) / one.std) ** 2)

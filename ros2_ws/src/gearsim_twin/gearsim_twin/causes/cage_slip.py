@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsim_twin.causes.bearing_model import fault_of
-from gearsim_twin.causes.cage_motion import SLIP_OR_GEOMETRY, Deviation, deviations, movable, united_std
+from gearsim_twin.causes.cage_motion import (
+    SLIP_OR_GEOMETRY,
+    Deviation,
+    cage_nats,
+    deviations,
+    movable,
+    united_std,
+)
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
@@ -75,6 +82,15 @@ class CageSlip:
             params["halving_force_n"] = halving
             params["slip"] = min(slip * (1.0 + float(values["force_n"]) / halving), 0.5)
         return with_fault(content, _KIND, str(values["component"]), params)
+
+    def told_again(self, values: Values, context: Context, heldout: Context) -> float:
+        """Nats by which positions of lines speak for it, in records for training and in those held out."""
+        slip, halving, at_n = (float(values[key]) for key in ("slip", "halving_force_n", "force_n"))
+
+        def share(force_n: float) -> float:
+            return -slip * ((1.0 + at_n / halving) / (1.0 + force_n / halving) if halving > 0 else 1.0)
+
+        return cage_nats(context, heldout, str(values["component"]), share)
 
     def signature(self, values: Values) -> str:
         """In plain words."""

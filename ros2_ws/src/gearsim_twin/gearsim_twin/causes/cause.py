@@ -61,6 +61,9 @@ class Cause(Protocol):
     -----
     A cause with an attribute `proven` that is true has a finder with a false alarm rate of its own, and reads
     all its numbers off the records: it counts as proven when it is found again in held-out records.
+    A cause that is read off where lines lie has a method `told_again(values, context, heldout)` instead: nats
+    by which these positions, in records for training and again in those held out, speak for it.
+    What the measuring chain of a model can make up for (gains, floors, bandwidths) has `of_chain` true.
     A cause whose first guesses may be far off in strength names the parameter that goes to nothing with it in
     an attribute `size`: a guess that shows too much is tried again with less of it.
     """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from gearsim_twin.causes.cause import Content
@@ -46,6 +46,11 @@ class Context:
         What the present model gave.
     noisy_views : tuple of View
         The same with the noise of the sensors that the records tell; empty where that is not known.
+    more_views, more_contents
+        Further records under the same conditions, not simulated, and the model under these: for what is read
+        off records alone.
+    gains_db : mapping of str to float
+        By channel, the gain of the measuring chain that `simulated` has been given.
     """
 
     case: Case
@@ -56,6 +61,9 @@ class Context:
     contents: tuple[Content, ...]
     simulated_views: tuple[View, ...]
     noisy_views: tuple[View, ...] = ()
+    more_views: tuple[View, ...] = ()
+    more_contents: tuple[Content, ...] = ()
+    gains_db: Mapping[str, float] = field(default_factory=dict)
 
     def differences(
         self, domain: str, channel: str | None = None, kind: str | None = None
