@@ -26,6 +26,9 @@ from gearsim_sim.model.plant import GRAVITY, Plant, RotatingSite, StateRow
 from gearsim_sim.model.side_data import SideStructure, no_structure
 
 Array = NDArray[np.float64]
+# Motion of casing and machine against each other is extrapolated over a step: where it swings by more than
+# some half a radian per step, that feeds itself. What else is coupled there makes it faster: so less is allowed.
+_MOST_RADIANS = 0.35
 
 
 class Carrying:
@@ -77,6 +80,7 @@ class Carrying:
             sites=matrix[felt],
             known=system.inputs[self._dofs, GRAVITY] * plant.gravity_m_per_s2,
         )
+        self._check_step()
         self.modes, self.interfaces = padded(carrier.omega.size), len(carrier.interfaces)
         mine = [i for i, row in enumerate(rows) if carrier.carries({**row.displacement, **row.rate})]
         self.state_rows = np.array(mine, dtype=np.int64)
@@ -98,6 +102,20 @@ class Carrying:
             poles=self._flat(weights.rate),
             known=self._flat(self._of.known.astype(np.complex128))[: self.modes],
         )
+
+    def _check_step(self) -> None:
+        """InputError if steps are too long for how firmly the structure holds what it carries."""
+        carrier, inner = self._plant.carrier, self._plant.internals.system
+        assert carrier is not None
+        held = inner.interfaces[:, self._own]
+        give = self._of.shapes @ self._of.shapes.T + held.T @ (held / np.diag(inner.mass)[:, None])
+        root = np.sqrt(carrier.stiffness_n_per_m)
+        squares, ways = np.linalg.eigh(root[:, None] * give * root)
+        frequency = math.sqrt(squares[-1])
+        if frequency * self._step_s > _MOST_RADIANS:
+            name = self._plant.system.interface_names[self._own[np.argmax(np.abs(ways[:, -1]))]]
+            expected = f"at least {frequency / _MOST_RADIANS:.0f}, as firmly as the casing holds {name}"
+            raise InputError("engine", "oversampling", f"{1 / self._step_s:.0f} steps per second", expected)
 
     def _bare(self) -> NDArray[np.bool_]:
         """Which of its interfaces have no element but the linear ones, (interfaces,)."""
