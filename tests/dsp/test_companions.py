@@ -199,3 +199,16 @@ def test_a_ring_on_the_shaft_may_ring_the_pedestal_of_another_bearing_on_it():
         bearings=(replace(plate.bearings[0], shaft="other"), plate.bearings[1]),
     )
     assert verdict_of(data, RATE, apart, tacho).findings == ()
+
+
+def test_of_two_rings_on_a_shaft_the_one_that_its_own_bearing_hears_is_told():
+    """Slip takes the first one's lines off its order, and its upper sideband onto that of the second one."""
+    order = 1.006 * BPFI
+    rng = np.random.default_rng(1)
+    turns = turns_of(SPEED, 4.0, RATE)
+    zone = np.exp(-0.5 * ((np.mod(turns, 1.0) - 0.5) / 0.06) ** 2)
+    x = defect(rng, turns, RATE, order, slip=0.002).x * zone
+    x *= 2.0 / np.sqrt(np.mean(x**2))
+    data = np.stack([noise(rng, turns.size) + x, noise(rng, turns.size) + 0.15 * x])
+    (finding,) = verdict_of(data, RATE, _plate(10 - order - 1), Signal(x, RATE, turns).tacho()).findings
+    assert (finding.component, finding.fault) == ("bearing_1", "inner_race")

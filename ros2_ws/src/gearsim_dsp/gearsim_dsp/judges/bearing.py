@@ -114,7 +114,9 @@ def find_faults(machine: Machine, pool: EvidencePool) -> Verdict:
         good = [g for g in open_groups if _stands(machine, g, latest[id(g)], findings, resolution)]
         if not good:
             break
-        merit = {id(g): _merit(_best(latest[id(g)]), speed) for g in good}
+        merit = {
+            id(g): _merit(_best(latest[id(g)]), speed) + _unheard(machine, g, latest[id(g)]) for g in good
+        }
         best = max(good, key=lambda g: merit[id(g)])
         alike = [g for g in good if _same_lines(_best(latest[id(g)]), _best(latest[id(best)]))]
         best = max(alike, key=lambda g: merit[id(g)] + _near(machine, g, latest[id(g)]))
@@ -184,6 +186,17 @@ def _merit(evidence: FamilyEvidence, speed: ShaftSpeed) -> float:
     still = float(np.median(evidence.sideband_snr_db or 0.0)) < _SWINGS_DB
     swing = _UNSWUNG if still and evidence.family.fault == "rolling_element" else 0.0
     return math.log(max(evidence.modulation, 1e-12)) - own / _MEAN_DEVIATION + swing
+
+
+def _unheard(machine: Machine, group: _Group, judged: list[FamilyEvidence]) -> float:
+    """Logarithm of how far below the limit a bearing hears its lines; 0 above.
+
+    Only a ring on the shaft may; the less its bearing hears, the likelier are lines of another one.
+    """
+    component = _component(machine, group, judged)[0].component
+    own = [e.channel for e in judged if e.channel in machine.bearing(component).channels]
+    heard = heard_at(judged, own, [e.channel for e in judged if e.channel not in own]) if own else 1.0
+    return min(0.0, math.log(max(heard, 1e-6) / _LEAST_HEARD))
 
 
 def _same_lines(one: FamilyEvidence, other: FamilyEvidence) -> bool:
