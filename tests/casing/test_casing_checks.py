@@ -9,11 +9,19 @@ import pytest
 from small_casing import small_params, small_structure
 
 from gearsim_sim.model.casing.build import reduce_casing
-from gearsim_sim.model.casing.checks import MODES, casing_checks, element_checks, rigid_checks
+from gearsim_sim.model.casing.checks import (
+    MODES,
+    casing_checks,
+    element_checks,
+    modal_test_check,
+    rigid_checks,
+    ships,
+)
 from gearsim_sim.model.casing.compare import SAME, difference, site_receptance
 from gearsim_sim.model.casing.export import write_deck_of
 from gearsim_sim.model.casing.measured import TABLE_3_1, pair_in_order
 from gearsim_sim.model.casing.nastran import read_frequencies_hz
+from gearsim_sim.model.casing.params import load_casing
 
 
 def test_pairs_keep_their_order_and_find_what_was_measured():
@@ -85,6 +93,21 @@ def test_a_coarse_casing_passes_what_does_not_hang_on_the_mesh():
     assert len(reductions) == 3
     assert all(check.met for check in reductions), reductions
     assert any(str(MODES) in step for step in steps)
+
+
+def test_descriptions_that_ship_are_known_and_those_changed_are_not():
+    for name in ("unsw_casing", "unsw_casing_updated"):
+        params = load_casing(name)
+        assert ships(params)
+        assert not ships(params.model_copy(update={"damping_ratio": 0.05}))
+    assert not ships(small_params().model_copy(update={"name": "coarse"}))
+
+
+def test_the_modal_test_asks_more_of_an_updated_casing():
+    measured, numbers = (np.array(column, dtype=float) for column in zip(*TABLE_3_1, strict=True))
+    model = 1.02 * np.interp(np.arange(1, 41), numbers, measured)
+    assert modal_test_check(model, updated=False).met
+    assert not modal_test_check(model, updated=True).met
 
 
 def test_a_deck_holds_the_whole_mesh(tmp_path):

@@ -10,7 +10,7 @@ from small_casing import small_params
 
 from gearsim_io.errors import EnvironmentLackError
 from gearsim_sim.model.casing import hammer
-from gearsim_sim.model.casing.from_test import update_to_test
+from gearsim_sim.model.casing.from_test import update_to_modes
 from gearsim_sim.model.casing.hammer import accelerance, make_specimen, strike
 from gearsim_sim.model.casing.identify import identify
 from gearsim_sim.model.casing.modal_test import POINTS, plan_test
@@ -30,6 +30,11 @@ def laboratory():
     plan = plan_test(nominal)
     specimen = make_specimen(params, mesh, 80, SEED)
     return params, plan, specimen, strike(specimen, plan, LINES, SEED)
+
+
+@pytest.fixture(scope="module")
+def identified(laboratory):
+    return identify(laboratory[3], 100.0, 2000.0)
 
 
 def test_the_plan_has_89_points_across_plates_and_three_references(laboratory):
@@ -62,9 +67,9 @@ def test_the_same_seed_gives_the_same_test_and_another_gives_another(laboratory)
     assert (strike(specimen, plan, LINES, SEED + 1).accelerance != test.accelerance).all()
 
 
-def test_modes_found_are_modes_of_the_specimen(laboratory):
-    _, plan, specimen, test = laboratory
-    found = identify(test, 100.0, 2000.0)
+def test_modes_found_are_modes_of_the_specimen(laboratory, identified):
+    _, plan, specimen, _ = laboratory
+    found = identified
     model = specimen.model
     values = mac(found.shapes, plan.rows(model).astype(complex))
     rows, columns = pair_by_mac(values, found.frequencies_hz, model.frequencies_hz, 0.85)
@@ -74,9 +79,9 @@ def test_modes_found_are_modes_of_the_specimen(laboratory):
     np.testing.assert_allclose(found.damping, specimen.damping[columns], rtol=0.25)
 
 
-def test_updating_finds_the_welds_that_differ(laboratory):
-    params, plan, specimen, test = laboratory
-    found = update_to_test(params, plan, test, 8, lambda _step: None)
+def test_updating_finds_the_welds_that_differ(laboratory, identified):
+    params, plan, specimen, _ = laboratory
+    found = update_to_modes(params, plan, identified, 8, lambda _step: None)
     off = [np.abs(found.update.deviations(after=after)).mean() for after in (False, True)]
     assert off[1] < 0.25 * off[0]
     assert len(found.update.last_pairs.modes) >= len(found.update.first_pairs.modes)

@@ -71,7 +71,7 @@ def casing_checks(params: CasingParams, *, finer: bool, tell: Callable[[str], No
     elastic = np.sqrt(squares[6:]) / (2 * np.pi)
     tell("reduction")
     yield from reduction_checks(structure, elastic)
-    if _ships(params):
+    if ships(params):
         yield modal_test_check(elastic, updated=bool(params.thickness_m))
         if params.name == "unsw_casing":
             tell("modes of the mesh that another program solved")
@@ -138,7 +138,7 @@ def modal_test_check(elastic_hz: Array, *, updated: bool) -> Check:
     return _percent("modal test of the thesis, mean", float(off.mean()), limit, detail)
 
 
-def _ships(params: CasingParams) -> bool:
+def ships(params: CasingParams) -> bool:
     """Whether this is a description that ships, with its reduction, unchanged."""
     return (FOLDER / f"{params.name}.yaml").is_file() and load_casing(params.name) == params
 
