@@ -27,7 +27,7 @@ from gearsim_sim.model.side_data import SideStructure, no_structure
 
 Array = NDArray[np.float64]
 # Motion of casing and machine against each other is extrapolated over a step: where it swings by more than
-# some half a radian per step, that feeds itself. What else is coupled there makes it faster: so less is allowed.
+# some half a radian per step, that feeds itself. What else is coupled there makes it faster: less is allowed.
 _MOST_RADIANS = 0.35
 
 
