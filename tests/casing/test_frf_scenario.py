@@ -138,6 +138,13 @@ def test_all_accelerometers_may_take_that_path():
     assert np.allclose(batch.data[1], 0.5 * ran().accel[1, :4096], rtol=1e-5, atol=1e-6)
 
 
+def test_what_comes_through_from_other_sites_takes_the_path_too():
+    each = {"a": {"site": SITE, "cross_axis": {"b1_y": 0.1}, "path": "frf"}, "b": {"site": "b1_y"}}
+    table = scenario(**with_accelerometers(channels=["a", "b"], each=each)).sensors
+    looks = [row.looks_at for row in table.accelerometers]
+    assert looks == [(("frf:" + SITE, 1.0), ("frf:b1_y", 0.1)), (("b1_y", 1.0),)]
+
+
 def test_the_shipped_responses_reach_20_khz_and_are_small():
     responses = find_responses("unsw_casing_updated")
     assert responses.valid_hz > 20000
