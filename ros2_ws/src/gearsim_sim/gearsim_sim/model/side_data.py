@@ -143,8 +143,8 @@ class SideStructure:
             return np.zeros(0, dtype=np.complex128)
         ahead = state[:count] + 1j * state[size : size + count]
         now, before = state[2 * size : 2 * size + count], state[3 * size : 3 * size + count]
-        entered = (w.now - w.gain) * now
-        return np.asarray(ahead / w.decay + entered + w.before * before + w.earlier * (2 * before - now))
+        past = w.before * before + w.earlier * (2 * before - now)
+        return np.asarray(ahead / w.decay + w.now * now + past)
 
 
 def no_structure() -> SideStructure:
