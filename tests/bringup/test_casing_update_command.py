@@ -66,6 +66,13 @@ def test_options_that_do_not_go_together_are_one_line(arguments, told, coarse, t
     said = capsys.readouterr().err.strip()
     assert told in said
     assert "\n" not in said
+    assert [path.name for path in tmp_path.iterdir()] == ["coarse.yaml"]
+
+
+def test_other_kinds_of_casings_are_not_updated(tmp_path, capsys):
+    arguments = ["casing", "update", "unsw_planetary_housing", "--out", str(tmp_path / "out")]
+    assert main(arguments) == BAD_INPUT
+    assert "kind: got ring_housing, expected a box of plates" in capsys.readouterr().err
 
 
 def test_a_file_in_the_way_is_told_in_one_line(coarse, tmp_path, capsys):

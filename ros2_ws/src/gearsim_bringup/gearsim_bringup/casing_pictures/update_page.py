@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from gearsim_bringup.casing_pictures.draw import draw_modes
@@ -22,12 +23,23 @@ from gearsim_sim.model.casing.updating import Update
 HEADER = ("measured_hz", "mode_before", "before_hz", "off_percent", "mode_after", "after_hz", "off_percent")
 
 
-def make_folder(out: Path) -> None:
-    """The folder for the files; InputError if there cannot be one."""
+@contextmanager
+def folder_for(out: Path) -> Iterator[None]:
+    """The folder for the files, made before the work; InputError if there cannot be one.
+
+    One that was not there before goes again if the work fails before it has left anything.
+    """
+    was_there = out.is_dir()
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError("--out", "", str(out), f"a folder ({error.strerror})") from None
+    try:
+        yield
+    except BaseException:
+        if not was_there and not any(out.iterdir()):
+            out.rmdir()
+        raise
 
 
 def write_update(

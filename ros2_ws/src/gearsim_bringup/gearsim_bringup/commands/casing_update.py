@@ -52,16 +52,15 @@ def update(
     --hammer a casing whose welds differ is struck instead. Modes of both are paired by MAC, and mirror images
     change alike.
     """
-    from gearsim_bringup.casing_pictures.update_page import make_folder, write_update
+    from gearsim_bringup.casing_pictures.update_page import folder_for, write_update
     from gearsim_sim.model.casing.against_thesis import BASIS, update_to_thesis
     from gearsim_sim.model.casing.params import load_casing
 
     _check_options(test, placement, band, hammer, export)
     voice = Voice(json_mode=json_mode)
     params = load_casing(casing)
-    make_folder(out)
     content: dict[str, Any] = {"name": params.name}
-    with voice.progress() as bar:
+    with folder_for(out), voice.progress() as bar:
         task = bar.add_task("mesh", total=None)
         tell = lambda step: bar.update(task, description=step)  # noqa: E731
         if test is not None:

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from gearsim_io.errors import InputError
-from gearsim_io.quantities import Si, load_yaml
+from gearsim_io.quantities import Si, load_yaml, read_yaml
 from gearsim_sim.model.casing.material import Material
 from gearsim_sim.params.fields import Count, Strict
 
@@ -128,6 +128,10 @@ def load_casing(name_or_path: str) -> CasingParams:
             expected = f"one of {', '.join(known)}, or the path of a .yaml file"
             raise InputError("casing", "", name_or_path, expected)
         path = FOLDER / f"{name_or_path}.yaml"
+    content = read_yaml(path)
+    if isinstance(content, dict) and "kind" in content:
+        expected = "a box of plates, which has no kind (others are built, reduced and shown alone)"
+        raise InputError(str(path), "kind", str(content["kind"]), expected)
     params = load_yaml(CasingParams, path, require_source=True)
     _check_fit(params, str(path))
     return params
