@@ -8,7 +8,7 @@ from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.gear_model import Part
 from gearsim_twin.causes.matched import matches
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.tooth_faults import most_of, toothed, with_tooth_fault
+from gearsim_twin.causes.tooth_faults import most_of, tooth_starts, toothed, with_tooth_fault
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -25,6 +25,7 @@ class ToothCrack:
     """Less stiffness of a mesh while one tooth is in contact."""
 
     name = "tooth_crack"
+    size = _SIZE
     parameters: tuple[Parameter, ...] = (Parameter("depth_m", "m", LogNormal(2e-3, 1.8, *_BOUNDS)),)
     confused_with: tuple[tuple[str, str], ...] = (
         (
@@ -49,15 +50,7 @@ class ToothCrack:
         unit = 0.5 * deepest
         bounds = (_BOUNDS[0], deepest)
         found = matches(context, parts, self._build, unit, bounds, angle="tooth", power=_GROWS)
-        return [
-            {
-                "component": match.part.name,
-                "depth_m": match.value,
-                "tooth": str(1 + round(match.angle_turns * match.part.teeth)),
-                **({"side": match.part.side} if match.part.side else {}),
-            }
-            for match in found[:_MOST]
-        ]
+        return tooth_starts(context, found, parts, _SIZE, unit, _MOST)
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With one tooth cracked, at most as deep as leaves a fifth of it."""

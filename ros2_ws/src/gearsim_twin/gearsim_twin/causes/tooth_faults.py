@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +10,19 @@ import numpy as np
 
 from gearsim_twin.causes.cause import Content
 from gearsim_twin.causes.edit import with_fault
-from gearsim_twin.causes.gear_model import Part, parts_of, plant_of
+from gearsim_twin.causes.gear_model import Part, has_planets, parts_of, plant_of
+from gearsim_twin.causes.matched import Match
+from gearsim_twin.compare.turns import KINDS
 
 if TYPE_CHECKING:
     from gearsim_sim.model.tooth.pair import GearPair
+    from gearsim_twin.causes.context import Context
 
-__all__ = ["most_of", "toothed", "with_tooth_fault"]
+__all__ = ["most_of", "tooth_starts", "toothed", "with_tooth_fault"]
 
 _CLEAR = 0.98
+_STANDS_OUT = 3.0  # standard deviations
+_MOST_STARTS = 4
 _STANDS = "ring"  # its teeth bear least, and each is met by all planets in turn
 _PLANETS = {"gear_tooth_crack": "planet_tooth_crack", "gear_tooth_spall": "planet_tooth_spall"}
 _SIDE_KEY = {"gear_tooth_crack": "opens_towards", "gear_tooth_spall": "side"}
@@ -28,6 +33,37 @@ def toothed(content: Content, kind: str) -> list[Part]:
     planets = parts_of(content, _PLANETS[kind])[:1]
     sides = [replace(planet, side=side) for planet in planets for side in ("sun", "ring")]
     return [*(part for part in parts_of(content, kind) if part.name != _STANDS), *sides]
+
+
+def tooth_starts(
+    context: Context, found: Sequence[Match], parts: Sequence[Part], size: str, usual: float, most: int
+) -> list[dict[str, float | str]]:
+    """First guesses of a fault of one tooth: what was matched, and of planets every part besides.
+
+    Teeth of planetary gears are drawn anew with every seed, so that a weak fault matches no phase. Their
+    average over the carrier's turn tells that single teeth do more than the model's; then each part is
+    tried with a fault of a usual size.
+    """
+    starts: list[dict[str, float | str]] = []
+    for match in found[:most]:
+        tooth = str(1 + round(match.angle_turns * match.part.teeth))
+        side: dict[str, float | str] = {"side": match.part.side} if match.part.side else {}
+        starts.append({"component": match.part.name, size: match.value, "tooth": tooth, **side})
+    if not has_planets(context.contents[0]) or not _teeth_stand_out(context):
+        return starts
+    tried = {(start["component"], start.get("side", "")) for start in starts}
+    for part in parts:
+        if (part.name, part.side) not in tried:
+            own: dict[str, float | str] = {"side": part.side} if part.side else {}
+            starts.append({"component": part.name, size: usual, "tooth": "1", **own})
+    return starts[:_MOST_STARTS]
+
+
+def _teeth_stand_out(context: Context) -> bool:
+    """Whether single teeth do more than those of the model, in averages over turns or in envelopes."""
+    averaged = (one.z for one in context.differences("transient") if one.place.kind in KINDS)
+    modulated = (one.z for one in context.differences("envelope") if one.place.kind != "ratio")
+    return max((*averaged, *modulated), default=0.0) > _STANDS_OUT
 
 
 def with_tooth_fault(

@@ -9,6 +9,7 @@ from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.gear_model import Part, parts_of
 from gearsim_twin.causes.matched import matches
 from gearsim_twin.causes.prior import Normal
+from gearsim_twin.causes.tooth_faults import tooth_starts
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -45,14 +46,10 @@ class ToothPitchError:
         """The wheels of which one tooth out of its place answers most, and which tooth."""
         parts = parts_of(context.contents[0], "tooth_pitch_error")
         found = matches(context, parts, self._build, _UNIT_M, _BOUNDS, angle="tooth", signed=True)
-        return [
-            {
-                "component": match.part.name,
-                "error_m": match.sign * match.value,
-                "tooth": str(1 + round(match.angle_turns * match.part.teeth)),
-            }
-            for match in found[:_MOST]
-        ]
+        starts = tooth_starts(context, found, parts, "error_m", _UNIT_M, _MOST)
+        for start, match in zip(starts, found[:_MOST], strict=False):
+            start["error_m"] = match.sign * match.value
+        return starts
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With one tooth out of its place."""

@@ -8,7 +8,7 @@ from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.gear_model import Part
 from gearsim_twin.causes.matched import matches
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.tooth_faults import most_of, toothed, with_tooth_fault
+from gearsim_twin.causes.tooth_faults import most_of, tooth_starts, toothed, with_tooth_fault
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -26,6 +26,7 @@ class ToothSpall:
     """A transmission error once a turn while the other flank rolls over a pit."""
 
     name = "tooth_spall"
+    size = _SIZE
     parameters: tuple[Parameter, ...] = (Parameter("width_m", "m", LogNormal(_UNIT_M, 2.0, *_BOUNDS)),)
     confused_with: tuple[tuple[str, str], ...] = (
         (
@@ -49,15 +50,7 @@ class ToothSpall:
         widest = min(most_of(context.contents[0], _KIND, part.name) for part in parts)
         bounds = (_BOUNDS[0], widest)
         found = matches(context, parts, self._build, _UNIT_M, bounds, angle="tooth", power=_GROWS)
-        return [
-            {
-                "component": match.part.name,
-                "width_m": match.value,
-                "tooth": str(1 + round(match.angle_turns * match.part.teeth)),
-                **({"side": match.part.side} if match.part.side else {}),
-            }
-            for match in found[:_MOST]
-        ]
+        return tooth_starts(context, found, parts, _SIZE, 0.3 * widest, _MOST)
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With a pit in one flank, at most as wide as the flank that works."""

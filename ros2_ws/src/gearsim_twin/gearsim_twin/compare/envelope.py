@@ -35,6 +35,7 @@ _LEAST_RATIO = 4.0
 _TURNS = 4
 _BIN_VARIANCE = 1.944
 _FEWEST_FLOOR_BINS = 8
+_BETWEEN = 5.5  # bins from one multiple to the next: two and a half are a line's on either side
 _FLOOR_SHARE = 0.9  # of a band's width, in which its envelope has a floor
 _HALVINGS = 30
 
@@ -56,14 +57,21 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
                 found.append(
                     Place("envelope", channel, "shaft", order, "order", _width(frame, order), label, band)
                 )
-            top = frame.highest_envelope_order
-            found.append(Place("envelope", channel, "floor", top / 2, "order", top, "", band))
+            if _parts_turns(frame):
+                top = frame.highest_envelope_order
+                found.append(Place("envelope", channel, "floor", top / 2, "order", top, "", band))
         found += _tones(frame, channel, materials)
         for family in frame.families:
             expected = _expected(family, channel, materials)
             width = 100 * 2.0 / frame.window_turns / (2 * family.order)
             found.append(Place("envelope", channel, "ratio", expected, "order", width, family.label))
     return found
+
+
+def _parts_turns(frame: Frame) -> bool:
+    """Whether there is anything between the multiples of the slowest shaft but what leaks from them."""
+    slowest = min((abs(shaft.ratio) for shaft in frame.machine.shafts), default=1.0)
+    return slowest * frame.window_turns >= _BETWEEN
 
 
 def _expected(family: Family, channel: str, materials: Sequence[Material]) -> float:

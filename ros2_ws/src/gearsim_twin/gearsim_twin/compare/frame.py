@@ -26,7 +26,8 @@ __all__ = ["Family", "Frame", "make_frame"]
 # four of a record (2.5 lengths, half overlapping), and seldom more than seven: cage lines are near others.
 _BINS_APART = 6.0
 _FEWEST_WINDOWS, _MOST_WINDOWS = 2.5, 4.0
-_LEAST_TURNS = 10.0
+# Of the slow reference shaft of a planetary stage, whose lines lie whole turns apart.
+_LEAST_TURNS = 5.0
 _TIME_WINDOWS, _LONGEST_S = 4.5, 2.0
 _LEAST_SECONDS = 0.25
 # Carrier bands: above the fault lines themselves (they would beat), each wide enough for four harmonics.

@@ -28,6 +28,9 @@ _TRANSIENT = {
     "decay": "decay time after an impact of {label}",
     "centre": "centre frequency after an impact of {label}",
     "spacing": "time from first to second impact of {label}",
+    "teeth": "lines of single teeth, averaged over a turn of {label}",
+    "knock": "kurtosis of what single teeth do, averaged over a turn of {label}",
+    "planet": "lines of a planet's turn, averaged over a turn of {label}",
 }
 
 

@@ -2,9 +2,9 @@
 
 Kinds: decay (duration of the averaged burst of a family, dB of 1 ms), centre (its centre frequency, dB of
 1 kHz), spacing (time from its first to a second impact, dB of 1 ms), and peak (of the envelope averaged over
-the turns of a shaft, over its mean). A family is looked at where it is found, in the carrier band where it is
-clearest; each of its periods is shifted so that the loudest moments coincide, as elements slip at random.
-Standard deviations: eight groups of periods, left out in turn.
+the turns of a shaft, over its mean); and what single teeth do (`turns`). A family is looked at where it is
+found, in the carrier band where it is clearest; each of its periods is shifted so that the loudest moments
+coincide, as elements slip at random. Standard deviations: eight groups of periods, left out in turn.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.lines import LEAST_STD_DB, jackknife
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.places import Place
+from gearsim_twin.compare.turns import KINDS, figure_of, turn_places
 
 __all__ = ["measure", "places"]
 
@@ -62,7 +63,7 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
                 for band in frame.bands_hz
             ]
         found += mine[: max(each, len(_IMPACTS))]
-    return found
+    return found + turn_places(frame, materials)
 
 
 def _band(frame: Frame, channel: str, family: Family, materials: Sequence[Material]) -> tuple[float, float]:
@@ -87,20 +88,32 @@ def _loudness(material: Material, channel: str, band: tuple[float, float], order
 def measure(material: Material, wanted: Sequence[Place]) -> Levels:
     """Figures of averaged bursts and turns; places of families that are not found say nothing."""
     level, std, gauss = (np.full(len(wanted), value) for value in (np.nan, np.inf, np.nan))
-    height = np.full(len(wanted), np.inf)
+    height, clear = np.full(len(wanted), np.inf), np.zeros(len(wanted))
+    hz, bandwidth = np.full(len(wanted), np.nan), np.full(len(wanted), np.nan)
     for k, place in enumerate(wanted):
         if material.phase is None:
             continue
-        if place.kind == "peak":
+        if place.kind in KINDS:
+            level[k], std[k], height[k], clear[k] = figure_of(material, place)
+            if place.band_hz is not None and place.kind != "knock":
+                hz[k], bandwidth[k] = math.sqrt(place.band_hz[0] * place.band_hz[1]), 0.0
+        elif place.kind == "peak":
             level[k], std[k], height[k] = _turn_peak(material, place)
-            gauss[k] = 0.0
+            gauss[k], clear[k] = 0.0, _CLEAR_PEAK_DB
         else:
             family = next(f for f in material.frame.families if f.label == place.label)
             assert place.band_hz is not None
             burst = _burst(material, place.channel, place.band_hz, family)
             level[k], std[k] = burst[_IMPACTS.index(place.kind)]
-    clear = np.where(np.isinf(height), 0.0, _CLEAR_PEAK_DB)
-    return Levels.of(level, std, height_db=height, clear_db=clear, gauss_db=gauss)
+    return Levels.of(
+        level,
+        std,
+        height_db=height,
+        clear_db=clear,
+        frequency_hz=hz,
+        bandwidth_hz=bandwidth,
+        gauss_db=gauss,
+    )
 
 
 def _turn_peak(material: Material, place: Place) -> tuple[float, float, float]:
