@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from blind import motion
 from blind.chain import sampled
-from blind.effects import CAUSES, EFFECTS, SEVERITIES, size_of
+from blind.effects import CAUSES, EFFECTS, SEVERITIES, noise_of, size_of
 from blind.making import Hidden, build_of, make, place_in
-from blind.plan import KINDS, planned
+from blind.plan import KINDS, drawn, planned
 from blind.rigs import RIGS
 from blind.severity import stands_out_db
+from blind.sizing import plain_data, stands_out
 
 from gearsim_sim.engine import Engine
 from gearsim_sim.events import FaultSpec
@@ -120,6 +121,48 @@ def test_the_yardstick_counts_decibels() -> None:
     assert stands_out_db(plain.astype(np.float32), louder.astype(np.float32), rate) == pytest.approx(
         6.0, abs=0.7
     )
+
+
+def test_noise_that_scatters_is_no_change() -> None:
+    """Single lines of two drawings of one noise differ by ten decibels; bands do not."""
+    rng = np.random.default_rng(4)
+    one, other = (rng.standard_normal((1, 40000)).astype(np.float32) for _ in range(2))
+    rate = 32768.0
+    assert stands_out_db(one, other, rate) > 8.0
+    assert stands_out_db(one, other, rate, random=True) < 3.0
+    assert stands_out_db(one, 4.0 * other, rate, random=True) == pytest.approx(12.0, abs=2.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "severity", "db"), [("sensor_resonance", "medium", 12.0), ("mains_interference", "mild", 6.0)]
+)
+def test_a_size_is_sought_on_the_machine_of_the_case(name: str, severity: str, db: float) -> None:
+    case, seed = drawn("bearing", ((name, severity),), (3, 1))
+    plain = plain_data("bearing", case.noise, seed)
+    assert stands_out("bearing", case.effects[0], case.noise, seed, plain) == pytest.approx(db, abs=2.0)
+    assert case.noise == noise_of([name], "bearing")
+
+
+def test_a_wrong_label_is_told_by_what_the_records_ran_at() -> None:
+    made = make(Hidden("bearing", (("mislabelled_record", 1.5),)), (21, 0), seconds=0.3)
+    (truth,) = made.truth["effects"]
+    assert set(truth) == {"name", "parameters", "hz", "size"}
+    if made.truth["speed_hz"] == RIGS["bearing"].speed_hz:
+        assert truth["parameters"] == {"speed_ratio": 0.5}  # a tacho with twice the pulses
+        return
+    speeds = []
+    for record in made.records[:2]:
+        (tacho,) = record.tachos
+        turns = (tacho.samples.size - 1) / tacho.pulses_per_revolution
+        speeds.append(turns * record.sample_rate_hz / (tacho.samples[-1] - tacho.samples[0]))
+    ratio = np.mean(speeds) / RIGS["bearing"].speed_hz
+    assert truth["parameters"]["speed_ratio"] == pytest.approx(ratio, rel=3e-4)
+
+
+def test_a_loud_hall_drowns_quiet_sensors() -> None:
+    assert noise_of(["casing_resonance", "bearing_spall_outer"], "bearing") > 1.0
+    assert noise_of(["casing_resonance", "clipping"], "bearing") < 1.0
+    assert noise_of(["clipping"], "bearing") == 1.0
 
 
 def test_plans_deal_all_causes_before_any_comes_again() -> None:

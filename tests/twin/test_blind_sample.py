@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 from blind.bounds import least_right, most_wrong
-from blind.effects import size_of
-from blind.making import Hidden, make, write
+from blind.making import make, write
+from blind.plan import drawn
 from blind.rigs import RIGS
 from blind.scoring import score
 
@@ -36,9 +36,7 @@ CASES = (
 
 
 def _score(name: str, seed: int, folder: Path) -> dict[str, Any]:
-    size = size_of(name, RIG.name, "strong") if name else None
-    effects = ((name, size),) if size is not None else ()
-    made = make(Hidden(RIG.name, effects), (seed,), seconds=SECONDS)
+    made = make(*drawn(RIG.name, ((name, "strong"),) if name else (), (seed,)), seconds=SECONDS)
     first, second, held_out = map(str, write(made, folder))
     case = load_case([first, second], RIG.machine, RIG.model, holdout=[held_out])
     verdict = judge(case, SETTINGS, folder / "extended.yaml").to_json()

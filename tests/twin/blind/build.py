@@ -45,6 +45,8 @@ class Build:
         Before and after the converter.
     truths : list of dict
         Name, parameters, and frequencies [Hz] of what is hidden.
+    ran_hz : list of float
+        Mean speed of each record made.
     """
 
     rig: Rig
@@ -67,6 +69,7 @@ class Build:
     analogue: list[ChainEffect] = field(default_factory=list)
     digital: list[ChainEffect] = field(default_factory=list)
     truths: list[dict[str, Any]] = field(default_factory=list)
+    ran_hz: list[float] = field(default_factory=list)
 
     @property
     def speed_hz(self) -> float:

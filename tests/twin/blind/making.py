@@ -14,7 +14,7 @@ from blind import motion
 from blind.build import Build
 from blind.chain import measured, pulses
 from blind.draws import low_noise
-from blind.effects import EFFECTS, size_of
+from blind.effects import EFFECTS
 from blind.rigs import RIGS, Rig
 from gearsim_io.bags.stream import StreamWriter
 from gearsim_io.bags.writer import BagWriter
@@ -33,6 +33,7 @@ _T0_NS = 1_700_000_000_000_000_000
 _DRIVE = 5e-5  # rms of what a good drive lets its speed wander within a record
 _LIGHT = 0.06  # of the nominal load, at which teeth with play rattle
 _MISUSE = {"backlash_contact_loss"}
+_LEARNT = 2  # records of a case that are not held out
 # The last motion: to look at many effects of the measuring chain, a machine need run only once.
 _motions: dict[str, Array] = {}
 
@@ -41,24 +42,12 @@ _motions: dict[str, Array] = {}
 class Hidden:
     """What is hidden in a case, and how much of it: pairs of an effect's name and its size.
 
-    `noise` is the sensors' over the rig's ordinary one; effects may ask for more.
+    `noise` is the sensors' over the rig's ordinary one.
     """
 
     rig: str
     effects: tuple[tuple[str, float], ...]
     noise: float = 1.0
-
-
-def hidden(rig: str, effects: tuple[tuple[str, str], ...], rng: np.random.Generator) -> Hidden:
-    """Effects at severities, with sizes that scatter by 12 % about them."""
-    found = []
-    for name, severity in effects:
-        spread = 1.0 if EFFECTS[name].given else float(np.exp(rng.uniform(-0.12, 0.12)))
-        size = size_of(name, rig, severity)
-        if size is None:
-            raise LookupError(f"no {severity} {name} on {rig}")
-        found.append((name, size * spread))
-    return Hidden(rig, tuple(found))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +93,12 @@ def make(case: Hidden, seed: tuple[int, ...], records: int = 3, seconds: float |
         streams = _Streams(*(np.random.default_rng([*seed, 1 + number, k]) for k in range(3)))
         extras = extras_of(streams.effects)
         made.append(_record(build, plant, extras, load, light, gains, streams, seconds or rig.seconds))
+    ran_hz = float(np.mean([build.ran_hz[k] for k in range(min(_LEARNT, records))]))
     for truth in build.truths:
+        stated = truth.pop("stated_hz", None)
+        if stated:  # a run is the speed that it had, and no mean of all runs
+            told = truth["parameters"]
+            told |= {key: ran_hz / stated if key == "speed_ratio" else ran_hz for key in told}
         limits = truth.pop("limits", None)
         if limits:
             truth["parameters"]["range_m_s2"] = float(min(limits.values()))
@@ -124,9 +118,11 @@ def build_of(case: Hidden, rng: np.random.Generator) -> Build:
     build = Build(rig, rng)
     build.parameters |= _perturbed(rig, rng)
     build.noise = case.noise
+    base = int(rng.integers(1 << 31))
     for name, size in case.effects:
+        # Random numbers of its own, so that an effect is the same alone and beside another.
+        build.rng = np.random.default_rng([base, *name.encode()])
         EFFECTS[name].enter(build, size)
-        build.noise = max(build.noise, EFFECTS[name].noise.get(rig.name, 1.0))
     return build
 
 
@@ -223,6 +219,7 @@ def _record(
     # The drive holds its speed within some parts in a thousand from run to run, and within a run even closer.
     mean = build.speed_hz * (1 + 0.003 * rng.course.uniform(-1, 1))
     speed = mean * (1 + _DRIVE * low_noise(halves, 2 * rate, 2.0, rng.course))
+    build.ran_hz.append(mean)
     if build.swing:
         speed += mean * build.swing * low_noise(halves, 2 * rate, build.swing_hz, rng.effects)
     turns = rng.course.uniform(0, 40) + (np.cumsum(speed) - speed) / (2 * rate)

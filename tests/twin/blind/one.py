@@ -16,12 +16,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from blind.detector import largest_db
 from blind.judging import judge
-from blind.making import hidden, make, write
-from blind.plan import Planned, planned
+from blind.making import make, write
+from blind.plan import Planned, drawn, planned
 from blind.rigs import RIGS
 from blind.scoring import score
 
@@ -54,8 +52,7 @@ def _records(plan: Planned, folder: Path) -> tuple[list[Path], dict[str, Any], P
     done = sorted(folder.parent.glob(f".{folder.name}-*/truth.json")) if folder.exists() else []
     if done:
         return sorted(folder.glob("run_*")), json.loads(done[0].read_text(encoding="utf-8")), done[0].parent
-    rng = np.random.default_rng([plan.seed, plan.index, 1])
-    made = make(hidden(plan.rig, plan.effects, rng), (plan.seed, plan.index))
+    made = make(*drawn(plan.rig, plan.effects, (plan.seed, plan.index)))
     folder.mkdir(parents=True, exist_ok=True)
     places = write(made, folder)
     secret = folder.parent / f".{folder.name}-{secrets.token_hex(8)}"

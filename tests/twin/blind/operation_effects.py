@@ -22,6 +22,7 @@ def speed_offset(build: Build, size: float) -> None:
     build.speed_factor = 1 + sign * size
     build.tacho_factor = 0.0
     build.hide("shaft_speed_offset", speed_hz=build.speed_hz)
+    build.truths[-1]["stated_hz"] = build.rig.speed_hz
 
 
 def speed_fluctuation(build: Build, size: float) -> None:
@@ -81,3 +82,4 @@ def mislabelled(build: Build, size: float) -> None:
     else:
         build.speed_factor = 1 / size ** (1 / 3) if build.rng.random() < 0.5 else size ** (1 / 3)
         build.hide("mislabelled_record", speed_ratio=build.speed_factor)
+        build.truths[-1]["stated_hz"] = build.rig.speed_hz

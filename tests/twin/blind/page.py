@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from blind.calibrate import TARGETS_DB
 from blind.detector import THRESHOLD_DB
+from blind.effects import TARGETS_DB
 from blind.tally import Share, closed, confusion, coverage, judged, lost, mild_enough, of_kind, right, share
 
 Result = dict[str, Any]
@@ -57,10 +57,13 @@ Each case is a machine with something hidden in it, or with nothing, made by a s
 product's (`tests/twin/blind`): Runge-Kutta of fourth order at 131 kHz, numbers of the machine some per cent
 off, teeth, noise, gain, speed, load and angles of its own; two records to learn from, one held out. The judge
 is `gearsim twin`, in a process that sees the records only; each file it opens is checked. *Mild*, *medium*,
-*strong* stand {levels} dB out of noise and machine, by one yardstick for all effects
-(`tests/twin/blind/severity.py`; labels, gains, clipping, roll-off, floor and play have given sizes).
-`oil_film` is not among the effects: on sound bearings it shows nothing. On the bearing rig a roll-off within
-the band changes no level by more than 1 dB, as nothing but noise is there; such cases count all the same.
+*strong* stand {levels} dB out of noise and machine on the very machine of the case, by one yardstick for all
+effects (`tests/twin/blind/severity.py`, `sizing.py`); gains are 6, 12, 19.8 dB; labels, swings of the speed,
+clipping, dropouts and play have given sizes. What no size brings so far out on a rig is not hidden there.
+`oil_film` is not among the effects: on sound bearings it changes what is below any sensor's noise. What
+shapes the vibration of the bearing rig (gains, roll-off, resonances of sensor and casing) is measured with
+quiet sensors (10 ug/sqrt(Hz)), its spalls in a loud hall. Of a noise floor the judge cannot know how high it
+should be: those hidden differ by their colour.
 Shares are given with Wilson's interval of 95 %. A case that ends without a verdict counts as wrong."""
 
 

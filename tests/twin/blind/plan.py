@@ -7,7 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from blind.effects import CAUSES, OUTSIDE, SEVERITIES, size_of
+from blind.effects import CAUSES, OUTSIDE, SEVERITIES, noise_of, size_of
+from blind.making import Hidden
+from blind.sizing import OutOfReachError, plain_data, size_for
 
 KINDS = ("single", "pair", "none", "outside")
 # Of twenty neighbours in number: twelve single effects, three pairs, two of nothing, three from outside.
@@ -16,6 +18,10 @@ _PATTERN = (
     "single", "outside", "single", "single", "none", "single", "outside", "single", "pair", "single",
 )  # fmt: skip
 _RIGS = ("parallel", "planetary", "bearing")
+# Machines of a case that are tried until one shows its effects as they should show.
+_MACHINES = 8
+# Sensors of cases without any effect: as they are with effects.
+_NONE_NOISE = {"bearing": (1.0, 0.05), "parallel": (1.0,), "planetary": (1.0,)}
 
 
 @dataclass(frozen=True)
@@ -104,3 +110,31 @@ def _pair(seed: int, index: int, rig: str) -> tuple[str, tuple[tuple[str, str], 
         first, second = (names[i] for i in rng.choice(len(names), 2, replace=False))
         if not {first, second} <= exclusive and "backlash_contact_loss" not in (first, second):
             return rig, ((first, "medium"), (second, "medium"))
+
+
+def drawn(
+    rig: str, effects: tuple[tuple[str, str], ...], seed: tuple[int, ...]
+) -> tuple[Hidden, tuple[int, ...]]:
+    """What is hidden, with sizes that make it stand out as its severity says, and the seed of the machine.
+
+    Raises
+    ------
+    OutOfReachError
+        If none of several machines shows it so.
+    """
+    if not effects:
+        choices = _NONE_NOISE[rig]
+        return Hidden(rig, (), choices[seed[-1] % len(choices)]), seed
+    noise = noise_of([name for name, _ in effects], rig)
+    for attempt in range(_MACHINES):
+        machine = (*seed, attempt) if attempt else seed
+        plain = plain_data(rig, noise, machine)
+        try:
+            sizes = [size_for(rig, name, how, noise, machine, plain) for name, how in effects]
+        except OutOfReachError:
+            if attempt + 1 == _MACHINES:
+                raise
+            continue
+        named = tuple((name, size) for (name, _), size in zip(effects, sizes, strict=True))
+        return Hidden(rig, named, noise), machine
+    raise AssertionError("unreachable")
