@@ -127,10 +127,13 @@ def test_people_get_lines_and_a_folder_that_is_free(bag, judged, tmp_path, capsy
 
 
 @pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (OSError("disk full"), 1)])
-def test_what_ends_early_leaves_nothing(error, code, bag, judged, tmp_path, capsys):
+def test_what_ends_early_leaves_nothing(error, code, bag, judged, tmp_path, capsys, monkeypatch):
     judged["fails"] = error
-    assert twin(bag, "--report", tmp_path / "report") == code
-    assert not (tmp_path / "report").exists()
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    assert twin(bag, "--report", tmp_path / "new" / "report") == code
+    assert twin(bag) == code  # to out/twin_1
+    assert set(tmp_path.iterdir()) == before
     assert capsys.readouterr().err.strip().splitlines()[-1].startswith("gearsim: ")
 
 

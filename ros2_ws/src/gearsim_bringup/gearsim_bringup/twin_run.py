@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,17 +47,28 @@ def run_judge(case: Case, folder: Path, workers: int | None, seed: int) -> Verdi
     from gearsim_twin.settings import Settings
 
     settings = Settings(seed=seed, workers=workers or min(_MOST_WORKERS, os.cpu_count() or 1))
-    folder.mkdir(parents=True)
-    try:
+    with _whole(folder):
         with _progress() as tell:
             verdict = judge(case, settings, folder / FILES[1], tell, show=True)
         text = json.dumps(plain(verdict.to_json()), allow_nan=False, indent=1)
         (folder / FILES[0]).write_text(text + "\n", encoding="utf-8")
         (folder / FILES[2]).write_text(make_twin_page(verdict), encoding="utf-8")
+    return verdict
+
+
+@contextmanager
+def _whole(folder: Path) -> Iterator[None]:
+    """A new folder that stays only if all goes well; nor do folders above it that were made for it."""
+    above = [path for path in folder.parents if not path.exists()]
+    try:
+        folder.mkdir(parents=True)
+        yield
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
+        for path in above:
+            with suppress(OSError):  # somebody else has put something there
+                path.rmdir()
         raise
-    return verdict
 
 
 def new_folder() -> Path:
@@ -64,7 +76,7 @@ def new_folder() -> Path:
     here = Path.cwd()
     base = here / "out" if (here / "out").is_dir() else here
     if not os.access(base, os.W_OK | os.X_OK):
-        return Path(tempfile.mkdtemp(prefix="gearsim_twin_")) / "twin_1"
+        return Path(tempfile.gettempdir()) / f"gearsim_twin_{secrets.token_hex(4)}" / "twin_1"
     return next(path for k in count(1) if not (path := Path("out") / f"twin_{k}").exists())
 
 
