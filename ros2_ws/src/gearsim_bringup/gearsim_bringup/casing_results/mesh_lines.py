@@ -161,7 +161,7 @@ def table(told: dict[tuple[str, str], Clarity]) -> list[str]:
     lines.append("|---|" + "---|" * len(_PASSED_HZ))
     for model, finite in zip(IN_CASING, (False, True), strict=True):
         lines.append(
-            f"| internals of `{model}` | " + _joined("{:.2g}", force_per_error(finite, _PASSED_HZ), 1e-6)
+            f"| internals of `{model}` | " + _joined("{:.3g}", force_per_error(finite, _PASSED_HZ), 1e-6)
         )
     return lines
 

@@ -89,6 +89,9 @@ class Run:
         Of the accelerometer `top` on a casing.
     rate_hz, chain : float, str
         Sampling rate, and what the accelerometer is.
+    path : str
+        `frf`: from the bearings' forces through the casing's responses to 20 kHz (approach B of the thesis)
+        in place of the reduction's modes (approach A).
     """
 
     model: str
@@ -100,11 +103,14 @@ class Run:
     site: str = "b3_top_y"
     rate_hz: float = RATE_HZ
     chain: str = "lab"
+    path: str = ""
 
     def content(self) -> dict[str, Any]:
         """The scenario."""
         lumped = self.model == "lpm34"
         each = {TOP: {"site": "b3_y" if lumped else self.site}}
+        if self.path:
+            each[TOP]["path"] = self.path
         parameters = dict(self.parameters)
         if self.casing:
             parameters["casing.reduced"] = self.casing

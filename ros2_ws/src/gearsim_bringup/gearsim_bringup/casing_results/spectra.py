@@ -6,6 +6,7 @@ specimen of gears than the models know (its own seed). Figures 5.15 to 5.20 and 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,16 +38,16 @@ class Spectra:
     ----------
     misfit_db : dict
         State and model over the bands.
-    same_internals_db : tuple of float
-        Spall of the inner race: `cb146` against the full casing with the internals and seed of `cb146`, so
-        that the casing's missing modes are all that differs.
+    lumped_internals_db : dict
+        Model over the bands, spall of the inner race: against the full casing under the lumped shafts of
+        `cb146`, of the same seed, so that in `cb146` the casing's missing modes are all that differs.
     rise_db : dict
         State (not healthy) and model, the rig being `rig`, over the bands: level with the fault less that
         without.
     """
 
     misfit_db: dict[tuple[str, str], tuple[float, ...]]
-    same_internals_db: tuple[float, ...]
+    lumped_internals_db: dict[str, tuple[float, ...]]
     rise_db: dict[tuple[str, str], tuple[float, ...]]
 
 
@@ -82,7 +83,7 @@ def tell(records: Records) -> Spectra:
     signals = {**{(state, "rig"): one for state, one in truth.items()}, **made}
     return Spectra(
         {(state, model): misfit_db(made[state, model], truth[state]) for state, model in made},
-        misfit_db(made["inner", "cb146"], alike),
+        {model: misfit_db(made["inner", model], alike) for model in MODELS},
         {
             (state, model): _rise(signals["healthy", model], one)
             for (state, model), one in signals.items()
@@ -106,20 +107,27 @@ def table(told: Spectra) -> list[str]:
         "|---|" + "---|" * len(names),
     ]
     for state in STATES:
-        lumped = told.misfit_db[state, "lpm34"]
-        for model in MODELS:
-            cells = []
-            for own, other in zip(told.misfit_db[state, model], lumped, strict=True):
-                cells.append(f"{own:.1f}" if model == "lpm34" else f"{own:.1f} (gain {other - own:+.1f})")
-            lines.append(f"| {state}: `{model}` | " + " | ".join(cells) + " |")
-    same = " | ".join(f"{value:.1f}" for value in told.same_internals_db)
-    lines.append(f"| inner: `cb146` against the full casing under its own internals | {same} |")
+        of_state = {model: told.misfit_db[state, model] for model in MODELS}
+        lines += _rows(state, of_state)
+    lines += _rows("inner, lumped shafts in the full casing, too", told.lumped_internals_db)
     lines += ["", "| fault above healthy, mean of the levels, dB | " + " | ".join(names) + " |"]
     lines.append("|---|" + "---|" * len(names))
     for (state, model), values in told.rise_db.items():
         shown = "full casing" if model == "rig" else f"`{model}`"
         lines.append(f"| {state}: {shown} | " + " | ".join(f"{value:+.1f}" for value in values) + " |")
     return lines
+
+
+def _rows(name: str, misfit: Mapping[str, tuple[float, ...]]) -> list[str]:
+    """A row for each model; what it gains over the lumped one in brackets."""
+    rows = []
+    for model, values in misfit.items():
+        cells = [
+            f"{own:.1f}" if model == "lpm34" else f"{own:.1f} (gain {other - own:+.1f})"
+            for own, other in zip(values, misfit["lpm34"], strict=True)
+        ]
+        rows.append(f"| {name}: `{model}` | " + " | ".join(cells) + " |")
+    return rows
 
 
 def draw(records: Records, told: Spectra) -> Figure:
