@@ -149,6 +149,39 @@ def test_units_of_length_and_force_are_converted(exported, tmp_path):
     same(*read(written(tmp_path, sets)))
 
 
+def test_points_may_have_coordinate_systems_of_their_own(exported, tmp_path):
+    """As some programs write directions. Of odd points x, y, z lie along z, x, y, from a place beside."""
+    sets = copied(exported)
+    beside = np.array([0.1, -0.2, 0.3])
+    system = {
+        "type": 18,
+        "cs_num": [5],
+        "ref_cs_num": [0],
+        "ref_o": [beside],
+        "x_point": [beside + np.array([0, 0, 2])],
+        "xz_point": [beside + np.array([0, 3, 4])],
+    }
+    for one in sets:
+        if one["type"] == 2411:
+            odd = one["node_nums"] % 2 == 1
+            one["def_cs"], one["disp_cs"] = 5 * odd, 5 * odd
+            x, y, z = (one[axis] - start * odd for axis, start in zip("xyz", beside, strict=True))
+            one.update(x=np.where(odd, z, x), y=np.where(odd, x, y), z=np.where(odd, y, z))
+        for end in ("rsp", "ref"):
+            if one["type"] == 58 and one[f"{end}_node"] % 2:
+                one[f"{end}_dir"] = {1: 2, 2: 3, 3: 1}[one[f"{end}_dir"]]
+    assert odd.any()
+    assert not odd.all()
+    same(*read(written(tmp_path, [system, *sets])))
+    for changes, told in (
+        ({"cs_type": [1]}, "coordinate system 5: got type 1, expected a Cartesian one"),
+        ({"ref_cs_num": [3]}, "coordinate system 5: got one in system 3, expected system 0"),
+        ({"x_point": [beside]}, "coordinate system 5: got points on one line"),
+    ):
+        with pytest.raises(InputError, match=told):
+            read(written(tmp_path, [{**system, **changes}, *copied(sets)]))
+
+
 def test_points_may_be_placed_by_hand(exported, tmp_path):
     sets = [one for one in copied(exported) if one["type"] != 2411]
     used = sorted({one["rsp_node"] for one in functions(sets)} | {one["ref_node"] for one in functions(sets)})
@@ -219,7 +252,10 @@ def shorter(one):
         (without(2411), r"geometry: got none, expected coordinates of the points \(data set 15 or 2411"),
         (geometry(fewer), "point [0-9]+: got no coordinates, expected those of every point"),
         (geometry(farther), r"points: got 1 of 12 off the casing \(point [0-9]+ at .* mm by .* mm\)"),
-        (geometry(lambda one: one["def_cs"].__setitem__(0, 7)), "points in systems of their own"),
+        (
+            geometry(lambda one: one["def_cs"].__setitem__(0, 7)),
+            "coordinates: got points in system 7, expected one system for all",
+        ),
         (without(164), "unit of length: got none, expected a data set 164, or `length_unit`"),
         (
             without(58),

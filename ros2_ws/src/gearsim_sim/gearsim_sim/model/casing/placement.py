@@ -71,7 +71,8 @@ def plan_of(measured: Measured, placement: Placement, mesh: Mesh) -> TestPlan:
 
     def of(directions: Sequence[Direction]) -> tuple[Cells, Array]:
         found = np.array([nodes[one.point] for one in directions], dtype=np.int64)
-        return found, placement.turn.T[[one.axis for one in directions]].reshape(-1, 3)
+        own = [measured.turns.get(one.point, np.eye(3))[:, one.axis] for one in directions]
+        return found, np.array(own).reshape(-1, 3) @ placement.turn.T
 
     return TestPlan(*of(measured.points), *of(measured.references))
 

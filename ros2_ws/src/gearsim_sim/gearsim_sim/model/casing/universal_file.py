@@ -1,8 +1,8 @@
 """Modal tests in universal files (SDRC's, .uff or .unv): what they hold, at points by their numbers.
 
-Read are frequency responses (data sets 58 of function type 4), mode shapes (55), coordinates (15, 2411) and
-units (164), by pyuff. Which side was struck does not matter: the references are the few places that every
-response has at one of its ends, the points those at the other.
+Read are frequency responses (data sets 58 of function type 4), mode shapes (55), coordinates (15, 2411),
+systems of coordinates (18) and units (164), by pyuff. Which side was struck does not matter: the references are
+the few places that every response has at one of its ends, the points those at the other.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_sim.model.casing.identify import IdentifiedModes
+from gearsim_sim.model.casing.local_systems import System, read_systems, system_of
 from gearsim_sim.model.casing.material import Array
 from gearsim_sim.model.casing.modal_test import ModalTest
 
@@ -52,6 +53,8 @@ class Measured:
     """The file, for messages."""
     places: Mapping[int, Array]
     """Coordinates of each point in the file's axes and unit of length."""
+    turns: Mapping[int, Array]
+    """Axes of each point's directions by columns, in the file's, shape (3, 3)."""
     metres: float | None
     """The unit of length; None where the file does not tell it."""
     points: tuple[Direction, ...]
@@ -78,20 +81,22 @@ def read_modal_test(path: Path, kind: str | None = None) -> Measured:
     where = str(path)
     sets = _read(path)
     metres, newtons = _units(sets.get(164, []), where)
-    places = _places(sets.get(15, []) + sets.get(2411, []), where)
+    places, turns = _places(
+        sets.get(15, []) + sets.get(2411, []), read_systems(sets.get(18, []), where), where
+    )
     functions = sets.get(58, [])
     responses = [one for one in functions if one["func_type"] == RESPONSE]
     if responses:
         scale = 1.0 if metres is None else metres / newtons
         points, references, test = _responses(responses, kind, scale, where)
-        return Measured(where, places, metres, points, references, test, None)
+        return Measured(where, places, turns, metres, points, references, test, None)
     if not sets.get(55):
         others = sorted({int(one["func_type"]) for one in functions})
         what = f"functions of type {others} alone" if others else "none"
         expected = "data sets 58 of function type 4, or mode shapes (data sets 55)"
         raise InputError(where, "frequency responses", what, expected)
     shaped, modes = _modes(sets[55], where)
-    return Measured(where, places, metres, shaped, (), None, modes)
+    return Measured(where, places, turns, metres, shaped, (), None, modes)
 
 
 def _read(path: Path) -> dict[int, list[dict[str, Any]]]:
@@ -109,7 +114,7 @@ def _read(path: Path) -> dict[int, list[dict[str, Any]]]:
         )
     found: dict[int, list[dict[str, Any]]] = {}
     for number, kind in enumerate(kinds):
-        if kind not in (15, 55, 58, 164, 2411):
+        if kind not in (15, 18, 55, 58, 164, 2411):
             continue
         try:
             found.setdefault(kind, []).append(file.read_sets(number))
@@ -130,8 +135,12 @@ def _units(sets: list[dict[str, Any]], where: str) -> tuple[float | None, float]
     return 1 / length, 1 / force
 
 
-def _places(sets: list[dict[str, Any]], where: str) -> dict[int, Array]:
+def _places(
+    sets: list[dict[str, Any]], known: Mapping[int, System], where: str
+) -> tuple[dict[int, Array], dict[int, Array]]:
+    """Places of points, and the axes of their directions."""
     found: dict[int, Array] = {}
+    turns: dict[int, Array] = {}
     for one in sets:
         numbers = np.asarray(one["node_nums"]).astype(int).tolist()
         columns = [np.asarray(one[axis], dtype=float) for axis in "xyz"]
@@ -140,16 +149,15 @@ def _places(sets: list[dict[str, Any]], where: str) -> dict[int, Array]:
             raise InputError(
                 where, f"data set {one['type']}", "a line too short", "seven numbers for each point"
             )
-        # Programs write 0 or 1 for the one that all share.
-        if (np.ptp(systems, axis=1) > 0).any():
-            raise InputError(
-                where, "coordinates", "points in systems of their own", "one system for all points"
-            )
-        found.update(zip(numbers, np.stack(columns, axis=1), strict=True))
+        shared = np.ptp(systems, axis=1) == 0
+        rows = zip(numbers, np.stack(columns, axis=1), systems.T.astype(int).tolist(), strict=True)
+        for number, place, (own, moved) in rows:
+            found[number] = system_of(own, known, bool(shared[0]), where).place(place)
+            turns[number] = system_of(moved, known, bool(shared[1]), where).axes
     for number, place in found.items():
         if not np.isfinite(place).all():
             raise InputError(where, f"point {number}", "coordinates that are not finite", "three numbers")
-    return found
+    return found, turns
 
 
 def _responses(
