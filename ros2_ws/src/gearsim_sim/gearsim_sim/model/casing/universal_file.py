@@ -1,8 +1,8 @@
 """Modal tests in universal files (SDRC's, .uff or .unv): what they hold, at points by their numbers.
 
 Read are frequency responses (data sets 58 of function type 4), mode shapes (55), coordinates (15, 2411),
-systems of coordinates (18) and units (164), by pyuff. Which side was struck does not matter: the references are
-the few places that every response has at one of its ends, the points those at the other.
+systems of coordinates (18) and units (164), by pyuff. Which side was struck does not matter: the references
+are the few places that every response has at one of its ends, the points those at the other.
 """
 
 from __future__ import annotations
