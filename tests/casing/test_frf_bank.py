@@ -78,7 +78,7 @@ def test_responses_are_those_of_the_whole_structure():
 
 
 def test_at_low_frequency_they_are_those_of_the_reduced_matrices():
-    """All terms of a site's recovery included; what modes above the cut-off do dynamically is 1e-5 at 300 Hz."""
+    """All terms of a site's recovery included; modes above the cut-off leave 1e-5 at 300 Hz."""
     casing, w = coarse(), 2 * np.pi * 300.0
     loads = np.zeros((casing.size, len(responses().inputs)))
     for k, name in enumerate(responses().inputs):
