@@ -17,6 +17,7 @@ from gearsim_sim.model.casing.reduced import modal_damping
 from gearsim_sim.model.on_casing import on_casing, own_modes, site_row
 from gearsim_sim.model.plant import Moment
 from gearsim_sim.model.plants import make_plant
+from gearsim_sim.model.side_data import SideStructure
 from gearsim_sim.model.statics import static_equilibrium
 from gearsim_sim.params import load_parallel_params
 from gearsim_sim.params.casing_gearbox import CasingGearboxParams
@@ -254,6 +255,11 @@ def test_at_rest_nothing_moves():
     w = state[0:2] + 1j * state[8:10] + weights.gain * (of.shapes.T @ forces)
     z = w + (weights.now + weights.before + weights.earlier) * (of.shapes.T @ forces)
     assert z.imag == pytest.approx(position, rel=1e-12)
+    # What hangs itself up beside it finds the same place, standing still.
+    structure = SideStructure(("one", "two"), of, np.zeros(0, dtype=np.int64), weights)
+    found = structure.coordinates(state)
+    assert found.imag == pytest.approx(position, rel=1e-12)
+    assert (weights.rate * found).imag == pytest.approx(np.zeros(2), abs=1e-12 * np.abs(position * 900).max())
 
 
 @pytest.mark.parametrize(
@@ -284,8 +290,38 @@ def _mounts(casing):
     return held @ np.linalg.solve(motion.T @ held, held.T)
 
 
-def test_what_it_cannot_do_is_said(params, on_ground):
+def test_what_it_cannot_do_is_said(on_ground):
     with pytest.raises(InputError, match="flexible casing"):
         engine(on_ground, forces=True)
-    with pytest.raises(InputError, match="run one by one"):
-        Ensemble([Variant(params, 1, (), 10.0, 50.0)])
+
+
+def test_an_ensemble_in_a_casing_is_one_engine_each(params, spall):
+    variants = [
+        Variant(params, 1, (), 10.0, 50.0),
+        Variant(params, 2, (spall,), 9.0, 40.0),
+        Variant(params, 1, (), 10.0, 50.0),
+    ]
+    sites = {"ring": {**make_plant(params, 1).sites["b3_y"]}}
+    ensemble = Ensemble(variants, RATE_HZ, sites=sites, workers=2)
+    at = ensemble.inject(2, dataclasses.replace(spall, fault_id="late"), ramp_s=0.01, at_sample=800)
+    assert at == 800 > ensemble.earliest_event_sample
+    found = np.concatenate([ensemble.advance(n).accel for n in (700, 2300)], axis=2)
+    for number in (0, 1):
+        one = variants[number]
+        alone = Engine(
+            params,
+            one.seed,
+            RATE_HZ,
+            faults=one.faults,
+            sites=sites,
+            speed_hz=one.speed_hz,
+            load_nm=one.load_nm,
+        )
+        assert np.array_equal(found[number], alone.advance(3000).accel)
+    assert np.array_equal(found[2, :, : at - 64], found[0, :, : at - 64])
+    assert np.std(found[2] - found[0]) > 0
+    with pytest.raises(InputError, match="0 to 2"):
+        ensemble.inject(3, spall)
+    other = dataclasses.replace(params, casing=dataclasses.replace(params.casing, sites=()))
+    with pytest.raises(InputError, match="the same casing in all variants"):
+        Ensemble([variants[0], Variant(other, 1)], RATE_HZ)

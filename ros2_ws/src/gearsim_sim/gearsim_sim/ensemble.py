@@ -4,7 +4,7 @@ Variants are laid side by side in vector registers: each number of the time loop
 variants, so that the processor integrates as many of them as a register holds for little more than the
 price of one. A variant gives what `Engine` gives for it, to rounding: the sums of the two loops have another
 order. It does not depend on which other variants run beside it, nor on how the run is split into calls, to
-the last bit.
+the last bit. Variants in a flexible casing have an engine each (`ensemble_engines`).
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 from gearsim_sim.engine import MIN_STEP_RATE_HZ, Sites, check_numbers, checked_sites, first_schedule
+from gearsim_sim.ensemble_engines import EngineRuns
+from gearsim_sim.ensemble_parts import EnsembleOutput, Variant
 from gearsim_sim.events import Clear, Event, FaultSpec, Inject, SetOperatingPoint
 from gearsim_sim.integrate.vectors import LANES
 from gearsim_sim.lane_group import Lane, LaneGroup
@@ -32,33 +33,10 @@ from gearsim_sim.profile.profile import constant_profile
 from gearsim_sim.stepper import Stepper
 from gearsim_sim.timeline import Timeline
 
+__all__ = ["Ensemble", "EnsembleOutput", "Variant"]
+
 Array = NDArray[np.float64]
 _Result = TypeVar("_Result")
-
-
-class Variant(NamedTuple):
-    """One machine of an ensemble; what is None is taken from its parameters."""
-
-    params: Any
-    seed: int = 1
-    faults: Sequence[FaultSpec] = ()
-    speed_hz: float | None = None
-    load_nm: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EnsembleOutput:
-    """`n` output samples of all variants, on one time axis; see `EngineOutput`."""
-
-    first_sample: int
-    site_names: tuple[str, ...]
-    accel: Array  # (variants, sites, n) [m/s^2]
-    shaft_names: tuple[str, ...]
-    turns: NDArray[np.int64]  # (variants, shafts, n) whole turns of each shaft's encoder
-    fraction: Array  # (variants, shafts, n) rest of the angle in turns, [0, 1)
-    speed_hz: Array  # (variants, shafts, n)
-    signal_names: tuple[str, ...]
-    signals: Array  # (variants, signals, n)
 
 
 class Ensemble:
@@ -105,6 +83,13 @@ class Ensemble:
         self._workers = workers
         self._next = 0
         self._tables: set[str] = set()
+        self._lanes: tuple[Lane, ...] = ()
+        self._engines: EngineRuns | None = None
+        first = self.variants[0]
+        if make_plant(first.params, first.seed).carrier is not None:
+            self._engines = EngineRuns(self.variants, self.sample_rate_hz, oversampling, sites, workers)
+            self.site_names = self._engines.site_names
+            return
         lanes = []
         for number, variant in enumerate(self.variants):
             check_numbers(variant.seed, sample_rate_hz, oversampling)
@@ -122,7 +107,7 @@ class Ensemble:
     def _lane(self, number: int, variant: Variant) -> Lane:
         plant = make_plant(variant.params, variant.seed)
         if plant.carrier is not None:
-            expected = "a machine without a flexible casing: those run one by one"
+            expected = "a machine on the ground, as the first one is"
             raise InputError("ensemble", f"variants.{number}", plant.name, expected)
         timeline = Timeline(plant, variant.seed, self.sample_rate_hz, self._steps)
         limits = plant.limits
@@ -146,16 +131,20 @@ class Ensemble:
     @property
     def shaft_names(self) -> tuple[str, ...]:
         """Names of the shafts whose encoders are put out."""
+        if self._engines is not None:
+            return self._engines.shaft_names
         return tuple(self._lanes[0].plant.encoders)
 
     @property
     def next_sample(self) -> int:
         """Index of the first sample that the next `advance` returns."""
-        return self._next
+        return self._next if self._engines is None else self._engines.next_sample
 
     @property
     def earliest_event_sample(self) -> int:
         """Earliest `at_sample` that an event may have now, see `Engine.earliest_event_sample`."""
+        if self._engines is not None:
+            return self._engines.earliest_event_sample
         return max(0, -(-self._groups[0].step // self._steps))
 
     def advance(self, n: int) -> EnsembleOutput:
@@ -168,6 +157,8 @@ class Ensemble:
         """
         if n < 1:
             raise InputError("ensemble", "n", n, "at least one sample")
+        if self._engines is not None:
+            return self._engines.advance(n)
         rows = self._lanes[0].stepper.row_count
         accel = np.empty((len(self._lanes), rows, n))
         places, start = {}, 0
@@ -226,8 +217,10 @@ class Ensemble:
         InputError
             If its sample is history, or a value is out of range.
         """
-        if not 0 <= variant < len(self._lanes):
-            raise InputError("ensemble", "variant", variant, f"0 to {len(self._lanes) - 1}")
+        if not 0 <= variant < len(self.variants):
+            raise InputError("ensemble", "variant", variant, f"0 to {len(self.variants) - 1}")
+        if self._engines is not None:
+            return self._engines.schedule(variant, event)
         lane = self._lanes[variant]
         if isinstance(event, Inject):
             tables = _check_fault(variant, event.fault, lane.plant, self.variants[variant].seed)
