@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from gearsim_bringup.gallery.analysis import compare
-from gearsim_bringup.gallery.cases import cases, faults_of
+from gearsim_bringup.gallery.cases import IN_CASINGS, cases, faults_of
 from gearsim_bringup.gallery.marks import mark_orders
 from gearsim_bringup.gallery.page import make_gallery
 from gearsim_dsp.kinematics import FaultFamily
@@ -26,9 +26,11 @@ def outer():
 
 
 def test_every_kind_has_a_scenario_that_shows_it():
-    found = {case.kind: case for case in cases()}
-    assert set(found) == set(REGISTRY)
-    for kind, case in found.items():
+    found = {case.name: case for case in cases()}
+    assert list(found) == [*REGISTRY, *IN_CASINGS]
+    assert {found[name].healthy.model for name in IN_CASINGS} == {"cb146", "cb182"}
+    for case in found.values():
+        kind = case.kind
         assert any(fault.kind == kind for fault in faults_of(case.faulty))
         assert not any(fault.kind == kind for fault in faults_of(case.healthy))
         assert REGISTRY[kind].look_for, kind
@@ -91,6 +93,6 @@ def test_unknown_kinds_are_named():
 
 def test_the_gallery_in_docs_is_complete():
     page = (GALLERY / "README.md").read_text(encoding="utf-8")
-    for kind in REGISTRY:
-        assert f"![{kind}]({kind}.png)" in page
-        assert (GALLERY / f"{kind}.png").is_file()
+    for name in (*REGISTRY, *IN_CASINGS):
+        assert f"![{name}]({name}.png)" in page
+        assert (GALLERY / f"{name}.png").is_file()

@@ -18,15 +18,16 @@ EXAMPLE = """
 
 @click.command("gallery", epilog=example(EXAMPLE))
 @click.option("--out", required=True, type=ANY_PATH, help="Folder for the pictures and their page.")
-@click.option("--only", multiple=True, help="A kind of fault; may be given more than once. Default: all.")
+@click.option(
+    "--only", multiple=True, help="A kind of fault, or casing_inner, casing_outer; repeatable. Default: all."
+)
 @click.option("--seconds", default=4.0, show_default=True, type=POSITIVE, help="Simulated time of a record.")
 @json_option
 def command(out: Path, only: tuple[str, ...], seconds: float, json_mode: bool) -> None:
     """Draw waveform, spectrum and envelope spectrum of every kind of fault."""
-    from gearsim_sim.model.faults import fault_kind
+    from gearsim_bringup.gallery.cases import check_names
 
-    for kind in only:
-        fault_kind(kind)
+    check_names(only)
     from gearsim_bringup.gallery.page import make_gallery  # after what can be refused at once
 
     voice = Voice(json_mode=json_mode)

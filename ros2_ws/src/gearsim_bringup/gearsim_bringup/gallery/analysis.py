@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from gearsim_bringup.gallery.cases import Case
+from gearsim_bringup.gallery.cases import IN_CASINGS, Case
 from gearsim_dsp.envelope import order_spectrum, squared_envelopes, window_spectrum
 from gearsim_dsp.kinematics import FaultFamily, fault_families
 from gearsim_dsp.speed import Phase, window_speed
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 _TURNS_SHOWN = 2.0
 _ORDERS_SHOWN = 25.0
 _BANDS = 24  # of which the one with the greatest change is shown
+_REDUCED_HZ = 4000.0  # up to here the shipped reductions of casings are valid
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ def compare(case: Case, seconds: float) -> Comparison:
     machine = case.healthy.machine
     speed = window_speed(faulty.tachos, faulty.sample_count, rate, machine)
     phase = speed.phase or _steady(faulty, case.healthy.speed_hz)
-    band = _band(pair, rate)
+    band = _band(pair, rate, _REDUCED_HZ if case.name in IN_CASINGS else 0.5 * rate)
     orders, envelopes = _envelopes(pair, rate, band, phase)
     first, count = _stretch(pair, rate, case.healthy.speed_hz)
     frequency, _ = welch(pair[0], rate, nperseg=_segment(pair[0].size))
@@ -89,15 +90,19 @@ def _stretch(pair: tuple[Array, Array], rate_hz: float, speed_hz: float) -> tupl
     return int(np.clip(centre - count // 2, 0, pair[0].size - count)), count
 
 
-def _band(pair: tuple[Array, Array], rate_hz: float) -> tuple[float, float]:
-    """The band in which the fault adds most to the signal, relative to what is there without it."""
+def _band(pair: tuple[Array, Array], rate_hz: float, limit_hz: float) -> tuple[float, float]:
+    """The band up to a limit in which the fault adds most, relative to what is there without it."""
     top = 0.45 * rate_hz
     edges = np.linspace(0, top, _BANDS + 1)
     width = edges[1] - edges[0]
     frequency, added = welch(pair[1] - pair[0], rate_hz, nperseg=4096)
     _, before = welch(pair[0], rate_hz, nperseg=4096)
     index = np.clip((frequency / width).astype(int), 0, _BANDS)
-    gain = [np.sum(added[index == k]) / np.sum(before[index == k]) for k in range(1, _BANDS)]
+    gain = [
+        np.sum(added[index == k]) / np.sum(before[index == k])
+        for k in range(1, _BANDS)
+        if edges[k + 1] <= limit_hz
+    ]
     low = float(edges[1 + int(np.argmax(gain))])
     return low, low + float(width)
 

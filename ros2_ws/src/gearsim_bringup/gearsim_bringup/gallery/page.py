@@ -14,11 +14,11 @@ from gearsim_sim.model.faults import REGISTRY
 PAGE = "README.md"
 _HEAD = """# Gallery
 
-One picture for every kind of fault that can be injected: the channel that shows it best, in grey without
-it and in red with it; nothing else differs, and the sensors are ideal. Made by `./gearsim gallery --out
-docs/gallery`; each section names the shipped scenario that has the fault (`./gearsim run NAME`). The band
-of the envelope is the one in which the fault adds most; dashed lines are the orders that the nameplate
-predicts for the component.
+One picture for every kind of fault that can be injected, and two of the gearbox in its flexible casing: the
+channel that shows it best, in grey without it and in red with it; nothing else differs, and the sensors are
+ideal. Made by `./gearsim gallery --out docs/gallery`; each section names the shipped scenario that has the
+fault (`./gearsim run NAME`). The band of the envelope is the one in which the fault adds most; dashed lines
+are the orders that the nameplate predicts for the component.
 """
 
 
@@ -32,11 +32,11 @@ def make_gallery(
     out : Path
         Made if it is not there.
     only : tuple of str
-        Kinds to draw; all if empty.
+        Names of cases to draw; all if empty.
     seconds : float
         Simulated time of each record.
     progress : callable
-        Called with what is done, how much there is, and the kind at hand.
+        Called with what is done, how much there is, and the name at hand.
 
     Returns
     -------
@@ -47,17 +47,17 @@ def make_gallery(
     out.mkdir(parents=True, exist_ok=True)
     files, sections = [], []
     for number, case in enumerate(chosen):
-        progress(number, len(chosen), case.kind)
+        progress(number, len(chosen), case.name)
         comparison = compare(case, seconds)
-        picture = out / f"{case.kind}.png"
-        half = picture.with_name(f".{case.kind}.png")
+        picture = out / f"{case.name}.png"
+        half = picture.with_name(f".{case.name}.png")
         draw(comparison, f"{case.kind} at {case.component} (scenario {case.example})", half)
         os.replace(half, picture)
         files.append(picture)
         sections.append(_section(case, comparison))
     if not only:
         page = out / PAGE
-        contents = "\n".join(f"- [{case.kind}](#{case.kind})" for case in chosen)
+        contents = "\n".join(f"- [{case.name}](#{case.name})" for case in chosen)
         page.write_text(_HEAD + "\n" + contents + "\n\n" + "\n".join(sections), encoding="utf-8")
         files.append(page)
     return files
@@ -68,9 +68,9 @@ def _section(case: Case, comparison: Comparison) -> str:
     healthy, faulty = comparison.rms
     change = f"rms of {comparison.channel} {healthy:.3g} to {faulty:.3g} {comparison.unit}"
     return (
-        f"## {case.kind}\n{_sentence(kind.summary)}\n\n*Look for:* {kind.look_for}\n\n"
+        f"## {case.name}\n{_sentence(kind.summary)}\n\n*Look for:* {kind.look_for}\n\n"
         f"Scenario `{case.example}`, {case.component}, {comparison.speed_hz:g} Hz: {change}.\n\n"
-        f"![{case.kind}]({case.kind}.png)\n"
+        f"![{case.name}]({case.name}.png)\n"
     )
 
 
