@@ -53,13 +53,13 @@ def make_results(
     if page is not None:
         for name, _ in chosen:
             _parts(page, name)  # refused before anything is simulated
-    out.mkdir(parents=True, exist_ok=True)
     files = []
     for number, (name, module) in enumerate(chosen):
         progress(number, len(chosen), name)
         told = module.tell(records)
         with styled():
             figure = module.draw(records, told)
+        out.mkdir(parents=True, exist_ok=True)
         files.append(out / f"{name}.png")
         save(figure, files[-1])
         if page is not None:
