@@ -11,9 +11,11 @@ from small_casing import small_params, small_structure
 from gearsim_sim.model.casing.build import reduce_casing
 from gearsim_sim.model.casing.checks import (
     MODES,
+    REFERENCE,
     casing_checks,
     element_checks,
     modal_test_check,
+    reference_check,
     rigid_checks,
     ships,
 )
@@ -108,6 +110,15 @@ def test_the_modal_test_asks_more_of_an_updated_casing():
     model = 1.02 * np.interp(np.arange(1, 41), numbers, measured)
     assert modal_test_check(model, updated=False).met
     assert not modal_test_check(model, updated=True).met
+
+
+def test_one_mode_too_far_from_the_other_programs_is_enough_to_fail():
+    frequencies = np.loadtxt(REFERENCE, delimiter=",", comments="#")[:, 1]
+    assert len(frequencies) == MODES
+    assert (np.diff(frequencies) > 0).all()
+    assert reference_check(frequencies * 1.009).met
+    frequencies[70] *= 0.98
+    assert not reference_check(frequencies).met
 
 
 def test_a_deck_holds_the_whole_mesh(tmp_path):
