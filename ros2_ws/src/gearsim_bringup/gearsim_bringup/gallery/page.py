@@ -17,8 +17,9 @@ _HEAD = """# Gallery
 One picture for every kind of fault that can be injected, and two of the gearbox in its flexible casing: the
 channel that shows it best, in grey without it and in red with it; nothing else differs, and the sensors are
 ideal. Made by `./gearsim gallery --out docs/gallery`; each section names the shipped scenario that has the
-fault (`./gearsim run NAME`). The band of the envelope is the one in which the fault adds most (in a casing below
-4 kHz, where the reduction is valid); dashed lines are the orders that the nameplate predicts for the component.
+fault (`./gearsim run NAME`). The band of the envelope is the one in which the fault adds most (in a casing
+below 4 kHz, where the reduction is valid); dashed lines are the orders that the nameplate predicts for the
+component.
 """
 
 
