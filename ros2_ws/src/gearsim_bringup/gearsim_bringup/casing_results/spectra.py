@@ -58,7 +58,7 @@ def band_levels(samples: Array, rate_hz: float = RATE_HZ) -> tuple[Array, Array]
     count = int(frequency[-1] / BIN_HZ)
     index = (frequency / BIN_HZ).astype(int)
     means = [float(np.mean(density[index == k])) for k in range(count)]
-    return (np.arange(count) + 0.5) * BIN_HZ, 10 * np.log10(np.array(means))
+    return np.asarray((np.arange(count) + 0.5) * BIN_HZ), 10 * np.log10(np.array(means))
 
 
 def misfit_db(model: Array, rig: Array) -> tuple[float, ...]:
