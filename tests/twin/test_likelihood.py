@@ -130,3 +130,22 @@ def test_what_is_assumed_costs_when_it_is_not_so():
     yard = yard_of(stack)
     good, bad = (yard.value(stack.filled({0: features}, [gain]), np.zeros(0)) for gain in (0.0, 6.0))
     assert good - bad == pytest.approx(18.0)
+
+
+def test_a_model_that_errs_by_many_decibels_everywhere_is_measured_by_these():
+    """A line 10 dB above one that errs by 7 dB all over is nothing much; above a good one it proves a lot."""
+    rng = np.random.default_rng(12)
+    more = []
+    for error_db in (7.0, 0.5):
+        level = error_db * rng.standard_normal(200)
+        stack = rows(std=0.3, level=level)
+        yard = yard_of(stack, tau=0.7)
+        residual, variance = yard.residual(levels(stack, 0.0)), yard.variance(levels(stack, 0.0))
+        noise = yard.noise(residual, variance)
+        # The core of a t distribution with 5 degrees is narrower than its spread, by up to sqrt(3 / 5).
+        assert 0.7 * error_db < np.hypot(noise.tau_db[0], 0.3) < 1.1 * error_db
+        better, worse = (np.where(np.arange(200) == 3, x, residual) for x in (0.0, 10.0))
+        gain = yard.loglike(better, variance, noise) - yard.loglike(worse, variance, noise)
+        more.append(float(gain.sum()))
+    assert more[0] < 2.0
+    assert more[1] > 4.0

@@ -129,3 +129,17 @@ def test_lines_out_of_place_again_speak_for_a_cage_by_their_standard_deviations(
     assert cages(monkeypatch, [-1e-3], [-4e-4]) == 0.0  # nearer to nothing than to what is stated
     assert cages(monkeypatch, [-1e-3], []) == 0.0
     assert cages(monkeypatch, [-2e-3], [-2e-3]) == 15.0  # however sure, not beyond what errors allow
+
+
+def test_lines_of_a_spall_are_proven_where_both_sets_of_records_have_them_in_one_place(monkeypatch):
+    from gearsim_twin.causes import spalls
+
+    def found(orders, _, *, absent):
+        assert absent  # not merely hidden by noise
+        return [(0, SimpleNamespace(component="b", found_order=order)) for order in orders]
+
+    monkeypatch.setattr(spalls, "candidates", found)
+    assert spalls.seen_again("b", "outer_race", [3.24], [3.25]) == REPEATED_NATS
+    for training, heldout in (([3.24], []), ([], [3.24]), ([3.24], [3.30])):
+        assert spalls.seen_again("b", "outer_race", training, heldout) == 0.0
+    assert spalls.seen_again("c", "outer_race", [3.24], [3.24]) == 0.0

@@ -43,14 +43,15 @@ class Candidate:
     def holds(self, gain: Gain, trifle_db: float) -> bool:
         """Whether a gain on held-out records is real.
 
-        What was found again in them must do no harm for sure; nor must what a measuring chain would make up for,
-        by what no sensor needs: it predicts the same, and all that differs is how probable that is.
+        What was found again in them must do no sure harm to likelihood and error at once; nor must what the
+        measuring chain makes up for by what no sensor needs: it predicts the same, and only differs by how
+        probable that is.
         """
         if gain.real(trifle_db):
             return True
         harmless = gain.nats > -_HARM_NATS
         if self.proof_nats > 0.0:
-            return harmless or gain.ci95_nats[1] > 0.0
+            return harmless or gain.ci95_nats[1] > 0.0 or gain.gain_db > trifle_db
         return harmless and bool(getattr(self.extension.cause, "of_chain", False))
 
     @property

@@ -5,7 +5,8 @@ supply. Their finders have false alarm rates of their own, and much of what they
 a cause is proven when it is found again, alike, in records that it was not read from.
 
 Where lines are is known far better than how high they should be, and kinematics do not err as levels do. So
-causes that move lines tell themselves by how much what they read off positions speaks for them.
+causes that move lines tell themselves by how much what they read off positions speaks for them. And lines of
+a damaged bearing that noise would not show in a record, nor in another, are there however wrong levels are.
 """
 
 from __future__ import annotations
@@ -13,14 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from gearsim_twin.causes.cause import Values
+from gearsim_twin.causes.cause import REPEATED_NATS, Values
 from gearsim_twin.causes.context import Context
 from gearsim_twin.model import READ, Extension
 
-__all__ = ["proof_nats", "with_proofs"]
+__all__ = ["REPEATED_NATS", "proof_nats", "with_proofs"]
 
-REPEATED_NATS = 7.0
-"""A finder that is wrong once in a thousand records is so twice in a row by chance this much more seldom."""
 # Two readings of one number agree within so many standard deviations, or within this part of it: courses of
 # speed and noise differ from record to record.
 _SIGMAS, _PART = 4.0, 0.35

@@ -103,13 +103,15 @@ def signs_of(view: View) -> tuple[Sign, ...]:
     return _FOUND[view]
 
 
-def unexplained_signs(context: Context, fault: str) -> list[tuple[int, Sign]]:
+def unexplained_signs(context: Context, fault: str, *, absent: bool = False) -> list[tuple[int, Sign]]:
     """Signs of one kind of fault that measured records show and the present model does not, strongest first.
 
-    One per component, with the number of the record that shows it most.
+    One per component, with the number of the record that shows it most. Usually the model is looked at with
+    the noise of its sensors, which hides what a sound bearing does; `absent` asks for what it has not at all.
     """
     best: dict[str, tuple[int, Sign]] = {}
-    for record, (measured, simulated) in enumerate(zip(context.views, context.simulated_views, strict=True)):
+    model = context.simulated_views if absent else context.noisy_views or context.simulated_views
+    for record, (measured, simulated) in enumerate(zip(context.views, model, strict=True)):
         present = [sign for sign in signs_of(simulated) if sign.fault == fault]
         for sign in signs_of(measured):
             if sign.fault != fault or any(_explains(one, sign) for one in present):

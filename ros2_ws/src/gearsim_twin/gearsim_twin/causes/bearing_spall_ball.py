@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gearsim_twin.causes.bearing_model import seat_of
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
-from gearsim_twin.causes.spalls import SPALL_WIDTH, candidates, has_bearings, width_starts
+from gearsim_twin.causes.spalls import SPALL_WIDTH, candidates, has_bearings, seen_again, width_starts
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -45,6 +45,10 @@ class BearingSpallBall:
         component = str(values["component"])
         widest = _WIDEST * seat_of(content, component).law.ball_radius_m
         return with_fault(content, _KIND, component, {"width_m": min(float(values["width_m"]), widest)})
+
+    def told_again(self, values: Values, context: Context, heldout: Context) -> float:
+        """Nats for its lines being found, and found again in records held out."""
+        return seen_again(str(values["component"]), "rolling_element", context, heldout)
 
     def signature(self, values: Values) -> str:
         """In plain words."""

@@ -15,6 +15,10 @@ from gearsim_twin.causes.prior import Prior
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
 
+REPEATED_NATS = 7.0
+"""What finding again adds: a finder that is wrong once in a thousand records is so twice in a row by chance
+this much more seldom."""
+
 Content = dict[str, Any]
 """What a scenario file holds."""
 Values = Mapping[str, float | str]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from gearsim_twin.causes.bearing_model import alike, bearings_of, has_defect, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, size_of, unexplained_signs
-from gearsim_twin.causes.cause import Content, Parameter, Values
+from gearsim_twin.causes.cause import REPEATED_NATS, Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
 
@@ -20,6 +20,7 @@ __all__ = [
     "candidates",
     "has_bearings",
     "known_width_m",
+    "seen_again",
     "sign_words",
     "width_starts",
 ]
@@ -33,6 +34,7 @@ _GUESSES = (0.05, 0.12, 0.27)
 _MOST_STARTS = 4
 _ROOM = 0.98
 _NEARLY = 0.5
+_ALIKE = 0.01  # slip changes from load to load by less
 _FAR_LOG = 0.5  # a width by events that is further from the usual one has that as a second guess
 
 
@@ -42,15 +44,27 @@ def has_bearings(context: Context) -> bool:
     return bool(named & set(bearings_of(context.contents[0])))
 
 
-def candidates(context: Context, fault: str) -> list[tuple[int, Sign]]:
+def candidates(context: Context, fault: str, *, absent: bool = False) -> list[tuple[int, Sign]]:
     """Unexplained signs of bearings that the model has, where no defect of it gives these lines already."""
     content, machine = context.contents[0], context.case.machine
     known = bearings_of(content)
     return [
         (record, sign)
-        for record, sign in unexplained_signs(context, fault)
+        for record, sign in unexplained_signs(context, fault, absent=absent)
         if sign.component in known and not has_defect(content, alike(machine, sign.component), fault)
     ]
+
+
+def seen_again(component: str, fault: str, context: Context, heldout: Context) -> float:
+    """Nats for lines that the model lacks in the records for training and, alike, in those held out."""
+    orders = []
+    for each in (context, heldout):
+        signs = candidates(each, fault, absent=True)
+        own = [sign.found_order for _, sign in signs if sign.component == component]
+        if not own:
+            return 0.0
+        orders.append(own[0])
+    return REPEATED_NATS if abs(orders[1] / orders[0] - 1.0) < _ALIKE else 0.0
 
 
 def known_width_m(context: Context, record: int, sign: Sign) -> float | None:
@@ -134,6 +148,10 @@ class RaceSpall:
         widest = _ROOM * min(law.ball_spacing_rad * radius, 2 * law.ball_radius_m)
         width = min(float(values["width_m"]), widest)
         return with_fault(content, self.kind, component, {"width_m": width})
+
+    def told_again(self, values: Values, context: Context, heldout: Context) -> float:
+        """Nats for its lines being found, and found again in records held out."""
+        return seen_again(str(values["component"]), self.fault, context, heldout)
 
     def signature(self, values: Values) -> str:
         """In plain words."""

@@ -13,7 +13,7 @@ from gearsim_twin.causes.bearing_model import seat_of
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spalls import candidates, has_bearings, known_width_m, sign_words
+from gearsim_twin.causes.spalls import candidates, has_bearings, known_width_m, seen_again, sign_words
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -86,6 +86,11 @@ class WideSpall:
             "depth_m": min(float(values["depth_m"]), _REACHED * reach),
         }
         return with_fault(content, _KIND, component, params)
+
+    def told_again(self, values: Values, context: Context, heldout: Context) -> float:
+        """Nats for its lines being found, and found again in records held out."""
+        fault = next(fault for fault, race in _RACES.items() if race == values["race"])
+        return seen_again(str(values["component"]), fault, context, heldout)
 
     def signature(self, values: Values) -> str:
         """In plain words."""
