@@ -96,7 +96,7 @@ CAUSES: dict[str, Effect] = {
     "dropouts": Effect(chain.dropouts, _ALL, given=(2.5, 6.0, 20.0)),
     "clipping": Effect(chain.clipping, _ALL, given=(2.0, 6.0, 12.0)),
     "antialias_rolloff": Effect(chain.rolloff, _ALL, 0.01, 0.4, noise=_QUIET, shrinks=True),
-    "coloured_floor": Effect(chain.floor, _ALL, 30.0, 1e5, random=True),
+    "coloured_floor": Effect(chain.floor, _ALL, 30.0, 4e3, random=True),
     "unit_or_gain_error": Effect(chain.gain, _ALL, given=(6.0, 12.0, 20.0), noise=_QUIET),
     "mislabelled_record": Effect(operation.mislabelled, _ALL, given=(1.5, 2.0, 3.0)),
 }

@@ -11,7 +11,7 @@ from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_section, with_sensor
 from gearsim_twin.causes.folded import folded_orders
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spectra_beside import Beside, CurveFit, agreeing, channels_of, fit_curve, pooled
+from gearsim_twin.causes.spectra_beside import Beside, CurveFit, agreeing, channels_of, fit_change, pooled
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -21,6 +21,9 @@ __all__ = ["AntialiasRolloff", "edge_of_band", "lowpass_db"]
 Array = NDArray[np.float64]
 
 _LEAST_DROP = 20.0  # of the robust sum of squares: three parameters more, and thousands of records
+# Where noise covers the upper band and a tuned model has met it half way, less must do: the fit tells.
+_COVERED_DROP = 7.0
+_VAGUE = 0.05  # of the corner: beyond, it is fitted
 _LEAST_SHARE = 0.15
 _FREER = 6.0  # by which any order must fit better than the second, having one parameter more
 _HIGHEST = 0.45  # of the rate: a corner above it is that of the usual filter
@@ -51,7 +54,8 @@ def edge_of_band(data: Beside, sample_rate_hz: float) -> CurveFit | None:
         end = k + _EDGE_BANDS
         before = float(np.median(level[k - 4 : k + 1]))
         fall = before - level[end]
-        model = float(np.median(data.simulated_db[k - 4 : k + 1]) - data.simulated_db[end])
+        expected = data.shaped(0.0)
+        model = float(np.median(expected[k - 4 : k + 1]) - expected[end])
         down = before - level[end:].max()
         if fall > _EDGE_DB and down > _EDGE_DB and model < 0.5 * fall and f[k] > _EDGE_FROM * sample_rate_hz:
             over = np.flatnonzero(level[k : end + 1] < before - 3.0)
@@ -73,15 +77,15 @@ def _rolloff(data: Beside, sample_rate_hz: float) -> CurveFit | None:
 
     low, top = max(50.0, f[2]), 0.49 * sample_rate_hz
     corners = [share * sample_rate_hz for share in (0.06, 0.15, 0.3)]
-    second = fit_curve(
+    second = fit_change(
         data,
-        lambda p: data.simulated_db + digital(p[0], p[1]),
+        lambda p: digital(p[0], p[1]),
         [(corner, 60.0) for corner in corners],
         ((low, 10.0), (top, 120.0)),
     )
-    fit = fit_curve(
+    fit = fit_change(
         data,
-        lambda p: data.simulated_db + lowpass_db(f, p[0], p[1], p[2]),
+        lambda p: lowpass_db(f, p[0], p[1], p[2]),
         [(corner, order, 60.0) for corner in corners for order in (2.0, 8.0)],
         ((low, 1.0, 10.0), (top, 40.0, 120.0)),
     )
@@ -98,9 +102,10 @@ def _rolloff(data: Beside, sample_rate_hz: float) -> CurveFit | None:
     else:
         curve = lowpass_db(f, *fit.values)
     corner, loss = fit.values[0], -float(curve[-1])
-    sure = fit.drop > _LEAST_DROP and fit.share > _LEAST_SHARE
+    covered = not bool(data.heard[-_EDGE_BANDS:].any())
+    sure = fit.drop > (_COVERED_DROP if covered else _LEAST_DROP) and fit.share > _LEAST_SHARE
     # A dip amid the band is no roll-off: the curve must fit its own upper part.
-    residual = np.abs(data.ratio_db - fit.gain_db - curve)[f > corner]
+    residual = np.abs(data.measured_db - data.shaped(fit.gain_db + curve))[f > corner]
     fits = residual.size >= 3 and float(np.median(residual)) < max(3.0, 0.25 * loss)
     return fit if sure and fits and loss > _LEAST_LOSS_DB and corner < _HIGHEST * sample_rate_hz else None
 
@@ -109,6 +114,7 @@ class AntialiasRolloff:
     """A chain that ends below the band, or that lets in what lies above it."""
 
     name = "antialias_rolloff"
+    of_chain = True
     parameters: tuple[Parameter, ...] = (Parameter("corner_hz", "Hz", LogNormal(8000.0, 2.5, 50.0, 1e6)),)
     confused_with: tuple[tuple[str, str], ...] = (
         ("sensor_resonance", "a record at a higher rate: a resonance is a peak before its fall"),
@@ -124,20 +130,18 @@ class AntialiasRolloff:
         starts: list[dict[str, float | str]] = []
         for component, fits in agreeing(context, _end_of_band, _AGREE)[:2]:
             (corner, std), (order, _) = pooled(fits, 0), pooled(fits, 1)
-            starts.append(
-                {
-                    "corner_hz": corner,
-                    "std:corner_hz": std,
-                    "kind": "converter" if order > _STEEP else "bandwidth",
-                    "order": order,
-                    "component": component,
-                }
-            )
+            start: dict[str, float | str] = {
+                "corner_hz": corner,
+                "kind": "converter" if order > _STEEP else "bandwidth",
+                "order": order,
+                "component": component,
+            }
+            starts.append(start if std > _VAGUE * corner else start | {"std:corner_hz": std})
         if folded := folded_orders(context.views):
             rate = context.views[0].record.sample_rate_hz
             words = ", ".join(f"{order:g}" for order in folded[:4])
-            start: dict[str, float | str] = {"corner_hz": rate, "kind": "none", "component": "all"}
-            starts.insert(0, start | {"orders": words, "image_hz": _image_hz(context, folded[0])})
+            unfiltered: dict[str, float | str] = {"corner_hz": rate, "kind": "none", "component": "all"}
+            starts.insert(0, unfiltered | {"orders": words, "image_hz": _image_hz(context, folded[0])})
         return starts
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:

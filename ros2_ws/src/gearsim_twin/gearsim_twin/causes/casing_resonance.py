@@ -13,7 +13,7 @@ from gearsim_io.quantities import Si
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_entry
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, fit_curve, peaks_hz
+from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, fit_change, peaks_hz
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -52,14 +52,14 @@ def _resonance(data: Beside, sample_rate_hz: float) -> CurveFit | None:
     """Own frequency, mass ratio and damping of a mass that makes the peak."""
     f = data.frequency_hz
 
-    def predicted(p: Array) -> Array:
-        return data.simulated_db + absorber_db(f, 10 ** p[0], 10 ** p[1], 10 ** p[2])
+    def change(p: Array) -> Array:
+        return absorber_db(f, 10 ** p[0], 10 ** p[1], 10 ** p[2])
 
     low, high = float(np.log10(f[3])), float(np.log10(0.42 * sample_rate_hz))
     places = np.clip(np.log10(peaks_hz(data)), low, high)
     # The peak lies above the frequency of the mass alone by the root of 1 + ratio.
     starts = [(at - 0.5 * np.log10(1 + 10**ratio), ratio, -1.5) for at in places for ratio in (-1.3, -0.4)]
-    fit = fit_curve(data, predicted, starts, ((low, -2.5, -3.0), (high, 1.0, -0.3)))
+    fit = fit_change(data, change, starts, ((low, -2.5, -3.0), (high, 1.0, -0.3)))
     own, ratio, damping = 10**fit.values
     peak = float(absorber_db(f, own, ratio, damping).max())
     if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or peak < _LEAST_PEAK_DB:
@@ -70,7 +70,7 @@ def _resonance(data: Beside, sample_rate_hz: float) -> CurveFit | None:
 
 def _dip(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG001
     """Frequency, ratio and damping of a mass that takes away a resonance of the model."""
-    under = data.simulated_db - data.measured_db
+    under = -data.ratio_db
     under = np.convolve(under - float(np.median(under)), [0.25, 0.5, 0.25], mode="same")[1:-1]
     k = int(np.argmax(under)) + 1
     if under[k - 1] < _LEAST_DIP_DB:
@@ -100,6 +100,7 @@ class CasingResonance:
     """A mass that swings on one measuring site."""
 
     name = "casing_resonance"
+    size = "mass_kg"  # goes to nothing with it
     parameters: tuple[Parameter, ...] = (
         Parameter("frequency_hz", "Hz", LogNormal(2000.0, 2.5, 20.0, 20000.0)),
         Parameter("damping_ratio", "1", LogNormal(0.03, 2.5, 1e-3, 0.5)),

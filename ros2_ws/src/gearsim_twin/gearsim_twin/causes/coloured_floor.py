@@ -23,6 +23,12 @@ _LEAST_DROP = 30.0
 _LEAST_SHARE = 0.2
 _LEAST_BANDS = 6  # half an octave in which the floor lies above the model
 _OVER_DB = 3.0
+# A white floor is any sensor's own, whatever its height; usual ones rise by 2 dB at most from there on down.
+_RISE_HZ, _LEAST_RISE_DB = 40.0, 4.0
+# Noise follows the law of 1/f; what machines and flow make has humps.
+_USUALLY_OFF_DB, _HARDLY_OFF_DB = 1.5, 5.0
+_VAGUE = 0.25  # decades of the corner
+_HIGHEST_CORNER = 0.124  # of the sample rate
 
 
 def floor_db(frequency_hz: Array, density: float, corner_hz: float) -> Array:
@@ -42,8 +48,14 @@ def _floor(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG
     starts = [(quiet + up, corner) for up in (-6.0, 0.0) for corner in (0.0, 2.0, 3.5)]
     fit = fit_curve(data, predicted, starts, ((-300.0, -2.0), (200.0, 5.0)), gain=False)
     added = floor_db(f, 10 ** (fit.values[0] / 20), 10 ** fit.values[1])
-    lifted = int(np.count_nonzero(added > data.simulated_db + _OVER_DB))
-    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or lifted < _LEAST_BANDS:
+    lifted = added > data.simulated_db + _OVER_DB
+    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or np.count_nonzero(lifted) < _LEAST_BANDS:
+        return None
+    rise = 10 * np.log10(1 + 10 ** fit.values[1] / _RISE_HZ)
+    off = np.abs(data.measured_db - predicted(fit.values))[lifted]
+    if fit.std[1] > _VAGUE or rise < _LEAST_RISE_DB:
+        return None
+    if np.median(off) > _USUALLY_OFF_DB or np.quantile(off, 0.9) > _HARDLY_OFF_DB:
         return None
     density, corner = 10 ** (fit.values[0] / 20), 10 ** fit.values[1]
     values = np.array([density, corner])
@@ -52,9 +64,11 @@ def _floor(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG
 
 
 class ColouredFloor:
-    """White noise with a rise of 1/f, one density for each channel."""
+    """White noise with a rise of 1/f, one density for each channel; of a white floor nothing is strange."""
 
     name = "coloured_floor"
+    of_chain = True
+    proven = True  # read off between the lines; a chain with a floor of its own shows little else of it
     parameters: tuple[Parameter, ...] = (
         Parameter("density", "m/s^2/Hz^0.5", LogNormal(1e-3, 6.0, 1e-12, 1e3)),
         Parameter("corner_hz", "Hz", LogNormal(30.0, 8.0, 0.011, 1e5)),
@@ -77,21 +91,20 @@ class ColouredFloor:
         start: dict[str, float | str] = {
             "density": float(top.values[0]),
             "std:density": float(top.std[0]),
-            "corner_hz": float(np.clip(top.values[1], 0.011, 1e5)),
+            "corner_hz": float(np.clip(top.values[1], 0.011, _most_corner_hz(context))),
             "std:corner_hz": float(top.std[1]),
         }
         return [start | {f"share:{c}": float(fit.values[0] / top.values[0]) for c, fit in found.items()}]
 
-    def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
+    def extend(self, content: Content, values: Values, context: Context) -> Content:
         """The content with that noise on the channels that have it."""
+        corner_hz = min(float(values["corner_hz"]), _most_corner_hz(context))
         for key, share in values.items():
             if key.startswith("share:"):
                 channel = key.removeprefix("share:")
                 density = float(values["density"]) * float(share)
                 content = with_sensor(content, channel, "noise_density", f"{density:.9g} m/s^2/Hz^0.5")
-                content = with_sensor(
-                    content, channel, "noise_corner", f"{float(values['corner_hz']):.9g} Hz"
-                )
+                content = with_sensor(content, channel, "noise_corner", f"{corner_hz:.9g} Hz")
         return content
 
     def signature(self, values: Values) -> str:
@@ -99,3 +112,8 @@ class ColouredFloor:
         corner = float(values["corner_hz"])
         rise = f", rising below {corner:.3g} Hz" if corner > 1 else ""
         return f"between the lines a floor of {float(values['density']):.2g} m/s^2/sqrt(Hz){rise}"
+
+
+def _most_corner_hz(context: Context) -> float:
+    """The highest corner that simulated sensors can have at the rate of the records."""
+    return _HIGHEST_CORNER * min(view.record.sample_rate_hz for view in context.views)

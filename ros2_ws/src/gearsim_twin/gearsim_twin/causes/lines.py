@@ -32,6 +32,7 @@ _REACH_LINES = 1.0  # nearer than that two lines of one record are one
 _TRIALS = 61
 _PROJECTIONS = 3
 _MOST_ORDERS = 600
+_ABOUT, _SAME_LINE = 2, 1e-3
 _NEIGHBOURS = 6.0  # lines: orders so near are fitted beside a sine
 
 
@@ -100,10 +101,14 @@ def line_spectrum(samples: NDArray[np.floating], sample_rate_hz: float) -> LineS
 
 @dataclass(frozen=True, slots=True)
 class MachineLines:
-    """Where lines of shafts and meshes lie: multiples of these fundamentals, within `error` (relative)."""
+    """Where lines of shafts and meshes lie: multiples of these fundamentals, within `error` (relative).
+
+    `counted`: the angle of the shafts is known from marks on them.
+    """
 
     fundamentals_hz: tuple[float, ...]
     error: float
+    counted: bool = False
 
     def explain(self, frequency_hz: float, step_hz: float, doubtful: bool = True) -> bool:
         """Whether a line may be the machine's; `doubtful` is said where its lines lie too dense to tell."""
@@ -133,7 +138,8 @@ def machine_lines(view: View) -> MachineLines:
     if not speeds:
         return MachineLines((), 0.0)
     error = max(speed.relative_error, _LEAST_ERROR.get(speed.source, _ESTIMATE_ERROR))
-    return MachineLines(tuple(ratio * one for one in speeds for ratio in kept), error)
+    fundamentals = tuple(ratio * one for one in speeds for ratio in kept)
+    return MachineLines(fundamentals, error, view.phase is not None and speed.source in _LEAST_ERROR)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,6 +186,17 @@ class SlowPart:
         weight, orders, rest = self._beside(frequency_hz)
         solved, _ = _sine(self._turning(frequency_hz), weight, orders, rest)
         return float(np.hypot(*solved))
+
+    def share_beyond_orders(self, frequency_hz: float) -> float:
+        """Share of one sine in all that the shafts' orders leave within some lines of it."""
+        weight, orders, rest = self._beside(frequency_hz)
+        _, explained = _sine(self._turning(frequency_hz), weight, orders, rest)
+        step = self.sample_rate_hz / self.signal.size
+        lines = [self._turning(frequency_hz + k * step) * weight[:, None] for k in range(-_ABOUT, _ABOUT + 1)]
+        columns = np.concatenate(lines, axis=1)
+        base, size, _ = np.linalg.svd(columns - orders @ (orders.T @ columns), full_matrices=False)
+        base = base[:, size > _SAME_LINE * size[0]]
+        return explained / max(float(np.sum((base.T @ rest) ** 2)), 1e-300)
 
     def refine(self, fundamental_hz: float, evidence: Mapping[int, float]) -> tuple[float, float]:
         """The fundamental of a few harmonic lines and its standard deviation, in Hz.

@@ -40,6 +40,10 @@ _LEAST_SHARE = 1e-6  # of hum in the signal's power: rounding and leakage are no
 _OWN = 0.25
 _AMPLITUDE_ERROR = 0.05  # of a line whose power is ten times the floor or more, beside an order
 _BESIDE, _SKIRT = 25, 4  # lines
+_LEAST_S = 0.8  # forty periods
+# Of what the shafts' orders leave about a line, so much in one sine at the supply's frequency: what orders
+# leave of themselves lies on both sides of them alike.
+_ONE_SINE = 0.7
 _SMALLEST_PART = 0.02
 _LARGEST_PART = 100.0
 
@@ -59,9 +63,10 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     Parameters
     ----------
     slow : SlowPart
-        Of a channel, two seconds at least.
+        Of a channel, 0.8 s at least.
     known : MachineLines
-        Orders of hum that fall on these do not count.
+        Orders of hum that fall on these do not count, unless the angle shows that they are none of these: a
+        line of the supply stays where it is while the orders beside it turn away from it.
     supply_hz : float
         Of the nameplate; 0: 50 and 60 Hz are tried.
 
@@ -71,7 +76,7 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
         None where the comb would come of noise in one of a million records.
     """
     sample_rate_hz = slow.sample_rate_hz
-    if slow.signal.size < 2 * sample_rate_hz:
+    if slow.signal.size < _LEAST_S * sample_rate_hz:
         return None
     samples = slow.without_orders(_TOP_HZ)
     spectrum = line_spectrum(samples, sample_rate_hz)
@@ -82,7 +87,7 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
         reach = _DRIFT * supply
         trials = np.arange(-reach, reach + 1e-9, 0.25 * spectrum.step_hz / _ORDERS[-1]) + supply
         orders = [k for k in _ORDERS if k * supply < 0.45 * sample_rate_hz]
-        free = np.array([[not known.explain(k * f, spectrum.step_hz) for f in trials] for k in orders])
+        free = np.array([[_is_free(slow, known, k * f, spectrum.step_hz) for f in trials] for k in orders])
         lines = np.stack([spectrum.at(k * trials) for k in orders]) * free
         total = np.minimum(lines, _CAP).sum(axis=0)
         top = int(np.argmax(total))
@@ -100,7 +105,7 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     if not best[2]:
         return None
     frequency, std = slow.refine(best[1], best[2])
-    free_lines = [k for k in best[2] if not known.explain(k * frequency, spectrum.step_hz)]
+    free_lines = [k for k in best[2] if _is_free(slow, known, k * frequency, spectrum.step_hz)]
     if not free_lines or min(abs(frequency / supply - 1) for supply in _SUPPLIES_HZ) > 1.1 * _DRIFT:
         return None
     orders = sorted({1, *best[2]})
@@ -108,6 +113,13 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     # The other orders are told in parts of the first, which must not vanish for that.
     amplitude[1] = max(amplitude[1], max(amplitude.values()) / _LARGEST_PART)
     return Hum(frequency, std, amplitude)
+
+
+def _is_free(slow: SlowPart, known: MachineLines, frequency_hz: float, step_hz: float) -> bool:
+    """Whether a line is none of the machine's: far from them, or beside one that the angle tells from it."""
+    if not known.explain(frequency_hz, step_hz):
+        return True
+    return known.counted and slow.share_beyond_orders(frequency_hz) > _ONE_SINE
 
 
 def _alone(spectrum: LineSpectrum, frequency_hz: float, evidence: float) -> bool:

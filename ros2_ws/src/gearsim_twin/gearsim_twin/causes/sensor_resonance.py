@@ -15,7 +15,7 @@ from gearsim_twin.causes.spectra_beside import (
     CurveFit,
     agreeing,
     channels_of,
-    fit_curve,
+    fit_change,
     peaks_hz,
     pooled,
 )
@@ -28,6 +28,8 @@ __all__ = ["SensorResonance", "mounted_db"]
 Array = NDArray[np.float64]
 
 _LEAST_DROP = 20.0
+_COVERED_DROP = 10.0  # where the sensors' noise covers half of the bands
+_SURE = 0.02  # of resonance and Q: what is read off no better is fitted
 _LEAST_SHARE = 0.15
 _VAGUE = 0.08  # of the resonance: an upper end that is merely different
 _AGREE = 0.06
@@ -43,23 +45,24 @@ def _resonance(data: Beside, sample_rate_hz: float) -> CurveFit | None:
     """Frequency and Q, if the ratio has both the peak and the fall beyond it (or the rise towards it)."""
     f = data.frequency_hz
 
-    def predicted(p: Array) -> Array:
-        return data.simulated_db + mounted_db(f, 10 ** p[0], 10 ** p[1])
+    def change(p: Array) -> Array:
+        return mounted_db(f, 10 ** p[0], 10 ** p[1])
 
     top = float(np.log10(1.2 * sample_rate_hz))
     places = [*peaks_hz(data), 0.55 * sample_rate_hz]
     starts = [(float(np.log10(place)), q) for place in places for q in (0.7, 1.3)]
     low = float(np.log10(max(100.0, f[2])))
-    fit = fit_curve(data, predicted, starts, ((low, -0.1), (top, 2.2)))
+    fit = fit_change(data, change, starts, ((low, -0.1), (top, 2.2)))
     resonance, q = 10 ** fit.values[0], 10 ** fit.values[1]
-    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or q < 1.5:
+    least = _LEAST_DROP if data.heard.mean() > 0.5 else _COVERED_DROP
+    if fit.drop < least or fit.share < _LEAST_SHARE or q < 1.5:
         return None
     peak = (f > resonance / 1.12) & (f < resonance * 1.12)
     ratio = data.ratio_db - fit.gain_db
     # The peak itself must show where it lies in the band, and the fall behind it.
     if peak.sum() >= 3 and float(ratio[peak].max()) < 3.0:
         return None
-    beyond = f > 1.6 * resonance
+    beyond = (f > 1.6 * resonance) & data.heard
     if beyond.sum() >= 4 and float(np.median(ratio[beyond])) > -1.0:
         return None
     std = np.array([2.3026 * fit.std[0] * resonance, 2.3026 * min(fit.std[1], 2.0) * q])
@@ -72,6 +75,7 @@ class SensorResonance:
     """A sensor on wax, a magnet or held by hand."""
 
     name = "sensor_resonance"
+    of_chain = True
     parameters: tuple[Parameter, ...] = (
         Parameter("resonance_hz", "Hz", LogNormal(8000.0, 2.5, 100.0, 1e5)),
         Parameter("q", "1", LogNormal(12.0, 2.5, 0.5, 200.0)),
@@ -90,15 +94,12 @@ class SensorResonance:
         starts: list[dict[str, float | str]] = []
         for component, fits in agreeing(context, _resonance, _AGREE)[:3]:
             (resonance, std), (q, q_std) = pooled(fits, 0), pooled(fits, 1)
-            starts.append(
-                {
-                    "resonance_hz": resonance,
-                    "std:resonance_hz": std,
-                    "q": q,
-                    "std:q": q_std,
-                    "component": component,
-                }
-            )
+            start: dict[str, float | str] = {"resonance_hz": resonance, "q": q, "component": component}
+            if std < _SURE * resonance:
+                start["std:resonance_hz"] = std
+            if q_std < _SURE * q:
+                start["std:q"] = q_std
+            starts.append(start)
         return starts
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from gearsim_dsp.spectra import welch_psd
 
@@ -33,6 +33,7 @@ _MODEL_DB = (
 )
 _LEAST_LINES = 3
 _FLOOR_QUANTILE = 0.25
+_MOST_GAIN_DB = 400.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,21 +48,43 @@ class Beside:
         Power densities, re 1 (m/s^2)^2/Hz.
     std_db : ndarray
         Of their difference: the scatter of both over the record, and 2 dB for the model.
+    floor_db : ndarray or None
+        Of the sensors' noise, which nothing before the sensor changes; None: not known, taken for none.
     """
 
     frequency_hz: Array
     measured_db: Array
     simulated_db: Array
     std_db: Array
+    floor_db: Array | None = None
 
     @property
     def ratio_db(self) -> Array:
-        """Measured over simulated."""
-        return self.measured_db - self.simulated_db
+        """Measured over simulated, the sensors' noise included."""
+        return self.measured_db - self.shaped(0.0)
+
+    def shaped(self, change_db: Array | float) -> Array:
+        """What the sensors would show if all that is simulated were changed by so many dB."""
+        level = np.asarray(self.simulated_db + change_db)
+        if self.floor_db is None:
+            return level
+        return np.asarray(10 * np.log10(10 ** (0.1 * level) + 10 ** (0.1 * self.floor_db)))
+
+    @property
+    def heard(self) -> NDArray[np.bool_]:
+        """Bands in which the sensors' noise does not cover what is simulated."""
+        if self.floor_db is None:
+            return np.ones(self.simulated_db.size, dtype=np.bool_)
+        return np.asarray(self.simulated_db > self.floor_db)
 
 
 def beside(
-    measured: View, simulated: View, channel: str, floor: bool = False, per_octave: int = _PER_OCTAVE
+    measured: View,
+    simulated: View,
+    channel: str,
+    floor: bool = False,
+    per_octave: int = _PER_OCTAVE,
+    noisy: View | None = None,
 ) -> Beside | None:
     """Spectra of a channel on both sides; None where one lacks it or has no signal.
 
@@ -73,25 +96,33 @@ def beside(
         Levels between the lines (the lower quartile of each band, taken as that of noise) in place of means.
     per_octave : int
         Bands in an octave; with more of them the lowest band lies higher.
+    noisy : View, optional
+        `simulated` with the sensors' noise.
     """
     if channel not in measured.record.channels or channel not in simulated.record.channels:
         return None
     top = _TOP * min(measured.record.sample_rate_hz, simulated.record.sample_rate_hz)
-    one = _levels(measured, channel, top, floor, per_octave)
-    other = _levels(simulated, channel, top, floor, per_octave)
+    rates = measured.record.sample_rate_hz, simulated.record.sample_rate_hz
+    model = simulated.signal(channel)
+    one = _levels(measured.signal(channel), rates[0], top, floor, per_octave)
+    other = _levels(model, rates[1], top, floor, per_octave)
     if one is None or other is None:
         return None
+    noise = None
+    if noisy is not None:
+        noise = _levels(noisy.signal(channel) - model, rates[1], top, floor, per_octave)
     low = max(one[0][0], other[0][0])
     grid = one[0][one[0] >= low - 1e-6]
     level, std = (np.interp(grid, one[0], row) for row in one[1:])
     beside_level, beside_std = (np.interp(grid, other[0], row) for row in other[1:])
-    return Beside(grid, level, beside_level, np.sqrt(std**2 + beside_std**2 + _MODEL_DB**2))
+    noise_level = None if noise is None else np.interp(grid, noise[0], noise[1])
+    spread = np.sqrt(std**2 + beside_std**2 + _MODEL_DB**2)
+    return Beside(grid, level, beside_level, spread, noise_level)
 
 
 def _levels(
-    view: View, channel: str, top_hz: float, floor: bool, per_octave: int
+    x: Array, rate: float, top_hz: float, floor: bool, per_octave: int
 ) -> tuple[Array, Array, Array] | None:
-    x, rate = view.signal(channel), view.record.sample_rate_hz
     if not np.all(np.isfinite(x)) or np.ptp(x) == 0 or x.size < 2048:
         return None
     length = x.size // _BLOCKS
@@ -198,12 +229,47 @@ def fit_curve(
     -----
     Robust least squares (soft l1): the model's own misfits here and there do not bend the curve.
     """
-    rough = float(np.median(data.ratio_db))
-    null = _solve(lambda p: data.simulated_db + p[0], data, [[rough if gain else 0.0]], ([-400.0], [400.0]))
+    rough = float(np.median(data.ratio_db)) if gain else 0.0
+
+    def levels(p: Array) -> Array:
+        return np.asarray(predicted(p[1:]) + p[0])
+
+    null = _solve(lambda p: data.shaped(0.0) + p[0], data, [[rough]], _bounds(([], []), gain))
     base = null.cost if gain else _cost(data.ratio_db / data.std_db)
-    free = ([-400.0, *bounds[0]], [400.0, *bounds[1]]) if gain else ([-1e-9, *bounds[0]], [1e-9, *bounds[1]])
-    first = rough if gain else 0.0
-    best = _solve(lambda p: predicted(p[1:]) + p[0], data, [[first, *start] for start in starts], free)
+    best = _solve(levels, data, [[rough, *start] for start in starts], _bounds(bounds, gain))
+    return _fitted(best, base, data)
+
+
+def fit_change(
+    data: Beside,
+    change_db: Callable[[Array], Array],
+    starts: Sequence[Sequence[float]],
+    bounds: tuple[Sequence[float], Sequence[float]],
+) -> CurveFit:
+    """As `fit_curve`, of a cause that changes what comes before the sensors' noise, by a gain besides.
+
+    `change_db` goes from parameters to the change in dB, shape (bands,).
+    """
+    heard = data.heard if np.any(data.heard) else np.ones(data.heard.size, dtype=np.bool_)
+    rough = float(np.median(data.ratio_db[heard]))
+    null = _solve(lambda p: data.shaped(p[0]), data, [[rough], [0.0]], _bounds(([], []), gain=True))
+    best = _solve(
+        lambda p: data.shaped(change_db(p[1:]) + p[0]),
+        data,
+        [[rough, *start] for start in starts],
+        _bounds(bounds, gain=True),
+    )
+    return _fitted(best, null.cost, data)
+
+
+def _bounds(own: tuple[Sequence[float], Sequence[float]], gain: bool) -> tuple[list[float], list[float]]:
+    """Those of a gain, free or held at none, before a curve's own."""
+    most = _MOST_GAIN_DB if gain else 1e-9
+    return [-most, *own[0]], [most, *own[1]]
+
+
+def _fitted(best: OptimizeResult, base: float, data: Beside) -> CurveFit:
+    """A solution beside the cost without the curve."""
     jac = best.jac[:, 1:]
     spread = max(2 * best.cost / max(data.std_db.size - best.x.size, 1), 1.0)
     # Neighbouring bands overlap by half: two thirds of them are independent, and the models' misfits fewer.
@@ -243,14 +309,15 @@ def by_channel(
 ) -> dict[str, CurveFit]:
     """What `find` gives for each channel, of the record in which it lowers the misfit most.
 
-    `find` gets the spectra and the sample rate, and gives None where there is nothing. With `noisy` the model
-    has the sensors' noise.
+    `find` gets the spectra and the sample rate, and gives None where there is nothing. With `noisy` it gets
+    the sensors' noise, too, where that is known.
     """
     found: dict[str, CurveFit] = {}
-    models = context.noisy_views if noisy else context.simulated_views
-    for view, model in zip(context.views, models, strict=True):
+    known: Sequence[View | None] = context.noisy_views if noisy else ()
+    heard = known or [None] * len(context.views)
+    for view, model, noise in zip(context.views, context.simulated_views, heard, strict=True):
         for channel in view.record.channels:
-            data = beside(view, model, channel, floor, per_octave)
+            data = beside(view, model, channel, floor, per_octave, noise)
             fit = None if data is None else find(data, view.record.sample_rate_hz)
             if fit is not None and (channel not in found or fit.drop > found[channel].drop):
                 found[channel] = fit
@@ -270,7 +337,7 @@ def agreeing(
     within : float
         Relative distance up to which the first parameters of two fits agree.
     """
-    found = by_channel(context, find)
+    found = by_channel(context, find, noisy=True)
     left = sorted(found, key=lambda name: -found[name].drop)
     groups = []
     while left:

@@ -13,11 +13,15 @@ from gearsim_twin.causes.prior import LogNormal
 from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel
 
 if TYPE_CHECKING:
-    from gearsim_twin.causes.context import Context
+    from gearsim_twin.causes.context import Context, Difference
 
 __all__ = ["UnitOrGainError", "known_factor"]
 
 _LEAST_DB = 0.8  # 10 %: within that the sensitivity of a sensor in the field is known
+_DOUBTED_DB = 2.5  # of a gain that is needed for lines to agree
+_FEWEST_LINES, _FEWEST_BANDS = 4, 8
+_VAGUE_DB = 0.5
+_HIDDEN = 1.5  # where a model was tuned without it, part of a gain is in the tuning
 _SIGMAS = 4.0
 _MOST_SCATTER_DB = 6.0
 _ALIKE_DB = 1.5
@@ -43,14 +47,17 @@ def known_factor(factor: float) -> str:
 
 def _gain(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG001
     """The median ratio of the levels, and its standard deviation by their scatter."""
-    ratio = data.ratio_db
+    ratio = data.ratio_db[data.heard]
+    if ratio.size < _FEWEST_BANDS:
+        return None
     gain = float(np.median(ratio))
     scatter = 1.4826 * float(np.median(np.abs(ratio - gain)))
     if scatter > _MOST_SCATTER_DB:  # another shape is no factor
         return None
     std = 1.2533 * max(scatter, 0.3) * (_CORRELATED / ratio.size) ** 0.5
     factor = 10 ** (gain / 20)
-    drop = float(np.sum((ratio / data.std_db) ** 2 - ((ratio - gain) / data.std_db) ** 2))
+    known = data.std_db[data.heard]
+    drop = float(np.sum((ratio / known) ** 2 - ((ratio - gain) / known) ** 2))
     return CurveFit(np.array([factor]), np.array([std]), gain, drop, 1.0)
 
 
@@ -58,8 +65,10 @@ class UnitOrGainError:
     """One factor on all levels of a channel, in every representation alike."""
 
     name = "unit_or_gain_error"
-    parameters: tuple[Parameter, ...] = (Parameter("factor", "1", LogNormal(1.0, 4.0, 1e-7, 1e7)),)
+    of_chain = True
+    parameters: tuple[Parameter, ...] = (Parameter("factor", "1", LogNormal(1.0, 4.0, 1e-7, 1e7), 0.1),)
     confused_with: tuple[tuple[str, str], ...] = (
+        ("bearing_clearance", "a tap with a calibrated hammer: a gain is the sensor's own"),
         ("load_fluctuation", "a record at another load: a gain is the same at all loads"),
         (
             "transfer_path",
@@ -72,10 +81,13 @@ class UnitOrGainError:
         return any(view.record.unit not in ("", "1") for view in context.views)
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
-        """All channels by one factor if they share it; else each channel that has its own."""
-        found = by_channel(context, _gain)
+        """All channels by one factor if they share it; else each channel that has its own.
+
+        What sensors' noise covers tells no gain: where little stands out of it, the lines that do are asked.
+        """
+        found = by_channel(context, _gain, noisy=True)
         if not found:
-            return []
+            return self._by_lines(context)
         db = {name: fit.gain_db for name, fit in found.items()}
         std = {name: float(fit.std[0]) for name, fit in found.items()}
         middle = float(np.median(list(db.values())))
@@ -83,10 +95,36 @@ class UnitOrGainError:
         alike = all(abs(db[name] - middle) <= max(_ALIKE_DB, _SIGMAS * std[name]) for name in db)
         if alike:
             sure = abs(middle) >= max(_LEAST_DB, _SIGMAS * shared)
-            return [_start(middle, shared, "all")] if sure else []
+            return [_start(middle, shared, "all")] if sure else self._by_lines(context)
         odd = [name for name in db if abs(db[name]) >= max(_LEAST_DB, _SIGMAS * std[name])]
         odd.sort(key=lambda name: -abs(db[name]))
         return [_start(db[name], std[name], name) for name in odd[:4]]
+
+    @staticmethod
+    def _by_lines(context: Context) -> list[dict[str, float | str]]:
+        """The gain that lines ask for beyond what the chain was given, and more of it."""
+        db = {}
+        for name in context.views[0].record.channels:
+            rest = [
+                each.difference_db
+                for each in context.differences("orders", name)
+                if _stands_out(context, each)
+            ]
+            if len(rest) >= _FEWEST_LINES:
+                db[name] = context.gains_db.get(name, 0.0) + float(np.median(rest))
+        if not db:
+            return []
+        middle = float(np.median(list(db.values())))
+        alike = len(db) == len(context.views[0].record.channels)
+        alike &= all(abs(each - middle) <= _ALIKE_DB for each in db.values())
+        asked = {"all": middle} if alike else db
+        worst = sorted(asked, key=lambda name: -abs(asked[name]))[:2]
+        return [
+            {"factor": 10 ** (times * asked[name] / 20), "component": name}
+            for name in worst
+            if abs(asked[name]) >= _DOUBTED_DB
+            for times in (1.0, _HIDDEN)
+        ]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:
         """The content with that gain: an error of the sensitivity, or beyond twice a weight of the site."""
@@ -114,6 +152,15 @@ class UnitOrGainError:
         )
 
 
+def _stands_out(context: Context, each: Difference) -> bool:
+    """Whether both the record and the model are above their noise at a place."""
+    k = context.measured[each.record].places.index(each.place)
+    sides = context.measured[each.record], context.simulated[each.record]
+    return bool(sides[0].stands_out[k] and sides[1].stands_out[k] and np.isfinite(each.difference_db))
+
+
 def _start(gain_db: float, std_db: float, component: str) -> dict[str, float | str]:
+    """Read off, or where that is vague left to the fit."""
     factor = 10 ** (gain_db / 20)
-    return {"factor": factor, "std:factor": 0.1151 * std_db * factor, "component": component}
+    start: dict[str, float | str] = {"factor": factor, "component": component}
+    return start if std_db > _VAGUE_DB else start | {"std:factor": 0.1151 * std_db * factor}
