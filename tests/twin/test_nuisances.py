@@ -122,7 +122,7 @@ def test_an_ideal_chain_changes_nothing_and_a_gain_shifts_powers_alone():
     for k, place in enumerate(model.places):
         if not np.isfinite(model.level_db[k]):
             continue
-        power = place.domain in ("orders", "psd") or place.kind == "rms"
+        power = place.domain in ("orders", "psd") or place.kind in ("rms", "teeth")
         assert louder.level_db[k] - model.level_db[k] == pytest.approx(6.0 if power else 0.0, abs=1e-6)
 
 

@@ -25,7 +25,7 @@ from scipy.sparse import csr_array
 from scipy.special import gammaln
 
 from gearsim_twin.dependence import independent_share
-from gearsim_twin.stack import ASSUMED, Array, Levels, Stack
+from gearsim_twin.stack import ASSUMED, TONES, Array, Levels, Stack
 
 __all__ = ["TAU_FACTOR", "Noise", "Posterior", "Yardstick"]
 
@@ -42,6 +42,7 @@ TAU_FACTOR = 1.6
 # A rig of few masses is wrong by many decibels everywhere: what tuning leaves is what it errs by. Measured
 # by less than that no cause would be sure to gain anything.
 _TAU_STEPS = np.linspace(-2.5, 5.5, 17)
+_TONE_STEPS = 3.0
 _ROUNDS, _NOISE_ROUNDS, _SAME = 10, 4, 1e-2
 
 
@@ -119,10 +120,12 @@ class Yardstick:
             if name == ASSUMED:
                 best[d] = float(_gauss(residual_db[mine], variance_db2[mine]).sum())
                 continue
-            grid = self.tau_median_db[d] * self.tau_factor[d] ** _TAU_STEPS
+            # Tones are no model's: what stands out among few of them is not what models err by.
+            steps = _TAU_STEPS[_TAU_STEPS <= _TONE_STEPS] if name == TONES else _TAU_STEPS
+            grid = self.tau_median_db[d] * self.tau_factor[d] ** steps
             core, wide = densities(residual_db[mine], variance_db2[mine] + grid[:, None] ** 2)
             terms = np.log(core[:, None] + _OUTLYING[:, None] * (wide - core)[:, None])
-            value = self.share[d] * terms.sum(axis=-1) - 0.5 * _TAU_STEPS[:, None] ** 2
+            value = self.share[d] * terms.sum(axis=-1) - 0.5 * steps[:, None] ** 2
             k, m = np.unravel_index(int(np.argmax(value)), value.shape)
             tau[d], outlying[d], best[d] = grid[k], _OUTLYING[m], value[k, m]
         return Noise(tau, outlying, best, float(self._quiet(told).sum()))
