@@ -93,5 +93,5 @@ def test_structure_at_a_site_that_is_not_there_is_refused():
             "resonances": [{"site": "lid_y", "mass": "1 kg", "frequency": "1 kHz", "damping_ratio": 0.02}]
         },
     }
-    with pytest.raises(InputError, match="got lid_y, expected one of b1_x, .*, side_output_x"):
+    with pytest.raises(InputError, match=r"got lid_y, expected one of b1_x, .*, side_output_x"):
         MODELS["cb146"](parse_scenario(content, Path("mine.yaml")))

@@ -15,8 +15,9 @@ lambda, and q = Im(z) / w_d. Three things make a step several times cheaper than
 
 The loop calls `carrier_motion`, then its force functions, then `carry_forces`, `carrier_accelerations` and
 `carrier_advance`. What the structure carries may turn against it: then forces and motions of a pair of its
-interfaces are turned on their way, see `model.carrier`. Sizes `nc` (modes, a multiple of LANES) and `ni` (interfaces) are compile-time constants;
-the number of sites may vary. Layout, in units of doubles (modes are padded with zeros):
+interfaces are turned on their way, see `model.carrier`. Sizes `nc` (modes, a multiple of LANES) and `ni`
+(interfaces) are compile-time constants; the number of sites may vary. Layout, in units of doubles (modes are
+padded with zeros):
 
     k: E 2nc | r 2nc | Im d_1 nc | Im d_2 nc | acceleration of z 2nc, of d_1 and d_2 2nc
        | shapes ni nc | shapes of sites ns nc
@@ -156,7 +157,7 @@ def pack_carrier_state(
 
 @inlined
 def turn(s: Array, at: int, carrier: Carrier, phases: Array, circle: Array, sense: float) -> None:
-    """Turn the pairs among the interfaces' numbers s[at:]: sense 1 into the axes of the structure, -1 back."""
+    """Turn the pairs among numbers of the interfaces, s[at:]: sense 1 into the structure's axes, -1 back."""
     for j in range(carrier.turning.shape[0]):
         x = at + carrier.turning[j, 0]
         c, sine = cosine_sine(phases[carrier.turning[j, 1]], circle)

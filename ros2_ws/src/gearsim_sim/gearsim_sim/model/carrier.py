@@ -67,9 +67,13 @@ def turn_matrix(angle_rad: float) -> Array:
 
 
 def pair_force(
-    stiffness: float, damping: float, inside: tuple[Array, Array], structure: tuple[Array, Array], angle_rad: float,
+    stiffness: float,
+    damping: float,
+    inside: tuple[Array, Array],
+    structure: tuple[Array, Array],
+    angle_rad: float,
     rate_rad_s: float,
-) -> PairForce:  # fmt: skip
+) -> PairForce:
     """Spring and damper between two places, given by displacement and rate each in their own axes."""
     turn = turn_matrix(angle_rad)
     swept = rate_rad_s * (turn_matrix(angle_rad + math.pi / 2).T @ structure[0])  # (d/dt R^T) p
@@ -165,7 +169,7 @@ def pair_places(system: LinearSystem, carrier: CarryingStructure) -> tuple[PairP
 
 
 def turned(system: LinearSystem, carrier: CarryingStructure, phases: Array) -> LinearSystem:
-    """The system with its turning pairs at these angles of the tracks [turns]; it tells no single elements."""
+    """The system with its turning pairs at these angles of the tracks [turns], without single elements."""
     interfaces, stiffness, damping = system.interfaces.copy(), system.stiffness.copy(), system.damping.copy()
     for pair, place in zip(carrier.turning, pair_places(system, carrier), strict=True):
         columns = [carrier.interfaces[i] for i in pair.both]

@@ -31,7 +31,8 @@ LIMIT = 1e-3
 # order, and 1e-3 needs 8 steps per sample on the planetary stage.
 RATTLING = {"gear_backlash": 4e-3}
 HEALTHY = "healthy"
-# In a flexible casing, where DOP853 takes long: a fault of a bearing, whose force the casing feels, and of teeth.
+# In a flexible casing, where DOP853 takes long: a fault of a bearing, whose force the casing feels, and of
+# teeth.
 _IN_CASING = ("outer_race_spall", "gear_tooth_crack", "planet_tooth_crack")
 _PEAK_S = 0.006  # where in the window the fault does most
 _BINS_S = 0.002

@@ -1,4 +1,4 @@
-"""Looseness: the bolts of a pedestal (or a casing's foot) hold no more; pressed it is stiff, lifted it is soft (`LooseFoot`)."""
+"""Looseness: bolts of a pedestal or foot hold no more; stiff when pressed, soft when lifted (`LooseFoot`)."""
 
 from __future__ import annotations
 
