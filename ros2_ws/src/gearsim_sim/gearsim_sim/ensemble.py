@@ -85,6 +85,8 @@ class Ensemble:
         self._tables: set[str] = set()
         self._lanes: tuple[Lane, ...] = ()
         self._engines: EngineRuns | None = None
+        for variant in self.variants:
+            check_numbers(variant.seed, sample_rate_hz, oversampling)
         first = self.variants[0]
         if make_plant(first.params, first.seed).carrier is not None:
             self._engines = EngineRuns(self.variants, self.sample_rate_hz, oversampling, sites, workers)
@@ -92,7 +94,6 @@ class Ensemble:
             return
         lanes = []
         for number, variant in enumerate(self.variants):
-            check_numbers(variant.seed, sample_rate_hz, oversampling)
             lanes.append(self._lane(number, variant))
             check_alike(number, lanes[number].stepper.data, lanes[0].stepper.data)
         self._lanes = tuple(lanes)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ from pydantic import Field
 
 from gearsim_io.quantities import Si, Strict
 from gearsim_sim.model.assembly import LinearSystem, Vector
-from gearsim_sim.model.plant import Plant
 from gearsim_sim.model.side_oscillator import SideOscillator
+
+if TYPE_CHECKING:  # a scenario is read, and refused, without the bearings that a plant imports
+    from gearsim_sim.model.plant import Plant
 
 Array = NDArray[np.float64]
 
