@@ -74,7 +74,7 @@ def casing_real_time_factor(
 ) -> float:
     """As `engine_real_time_factor`, with one accelerometer on a wall and the eight forces on the casing."""
     engine = Engine(params, 1, SAMPLE_RATE_HZ, looked_at=[params.casing.sites[-1].name], forces=True)
-    return _best_factor(engine, seconds, repeats, clock)
+    return best_factor(engine.advance, seconds, repeats, clock)
 
 
 def casing_alias_db(params: CasingGearboxParams, oversampling: int, seconds: float = 0.1) -> float:
@@ -93,12 +93,15 @@ def casing_alias_db(params: CasingGearboxParams, oversampling: int, seconds: flo
     return float(alias_level_db(signal, truth).max())
 
 
-def _best_factor(engine: Engine, seconds: float, repeats: int, clock: Callable[[], float]) -> float:
+def best_factor(
+    run: Callable[[int], object], seconds: float, repeats: int, clock: Callable[[], float]
+) -> float:
+    """Seconds of samples that `run(samples)` makes per second of `clock`, the best of `repeats` runs."""
     samples = round(seconds * SAMPLE_RATE_HZ)
     best = math.inf
     for _ in range(repeats):
         start = clock()
-        engine.advance(samples)
+        run(samples)
         best = min(best, clock() - start)
     return samples / SAMPLE_RATE_HZ / best
 
@@ -127,7 +130,7 @@ def engine_real_time_factor(
         Default: the 34-DOF gearbox.
     """
     engine = Engine(load_parallel_params() if params is None else params, 1, SAMPLE_RATE_HZ, oversampling)
-    return _best_factor(engine, seconds, repeats, clock)
+    return best_factor(engine.advance, seconds, repeats, clock)
 
 
 def ensemble_real_time_factor(

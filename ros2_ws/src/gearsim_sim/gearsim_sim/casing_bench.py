@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import resource
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsim_sim.bench import SAMPLE_RATE_HZ, casing_params
+from gearsim_sim.bench import SAMPLE_RATE_HZ, best_factor, casing_params
 from gearsim_sim.frf.bank import ResonatorBank
 from gearsim_sim.frf.file import find_responses
 from gearsim_sim.frf.responses import responses_of
@@ -71,9 +70,4 @@ def bank_real_time_factor(
     samples = round(seconds * SAMPLE_RATE_HZ)
     forces = np.random.default_rng(1).normal(size=(len(responses.inputs), samples))
     bank.push(forces[:, :64])  # compiles
-    best = math.inf
-    for _ in range(repeats):
-        start = clock()
-        bank.push(forces)
-        best = min(best, clock() - start)
-    return samples / SAMPLE_RATE_HZ / best
+    return best_factor(lambda _: bank.push(forces), seconds, repeats, clock)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -124,12 +126,18 @@ def reduce(
 
     voice = Voice(json_mode=json_mode)
     check_target(out)
-    with voice.progress() as bar:
-        task = bar.add_task("reading", total=1.0)
-        tell: Tell = lambda step, done: bar.update(task, description=step, completed=done)  # noqa: E731
+    with _telling(voice) as tell:
         reduced = reduce_description(casing, modes, sensors, band_hz, tell)
     save_reduced(reduced, out)
     _tell_reduced(voice, reduced, out)
+
+
+@contextmanager
+def _telling(voice: Voice) -> Iterator[Tell]:
+    """A bar that a reduction moves by telling its step and how much is done."""
+    with voice.progress() as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda step, done: bar.update(task, description=step, completed=done)
 
 
 def _tell_reduced(voice: Voice, reduced: ReducedCasing, out: Path) -> None:
@@ -184,9 +192,7 @@ def responses(
 
     voice = Voice(json_mode=json_mode)
     check_target(out)
-    with voice.progress() as bar:
-        task = bar.add_task("reading", total=1.0)
-        tell: Tell = lambda step, done: bar.update(task, description=step, completed=done)  # noqa: E731
+    with _telling(voice) as tell:
         found = make_responses(casing, modes, sensors, band_hz, tell)
     save_responses(found, out)
     voice.say(f"{found.name}: responses to {len(found.inputs)} forces, {', '.join(found.inputs)}")

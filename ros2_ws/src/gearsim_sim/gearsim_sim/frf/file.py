@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearsim_io.errors import InputError
+from gearsim_sim.archive import find_archive, read_archive, write_archive
 from gearsim_sim.frf.responses import CasingResponses
 
 FORMAT = 1
@@ -20,14 +19,7 @@ _ARRAYS = ("omega", "ratios", "input_shapes", "site_shapes", "residual", "compli
 
 def find_responses(name_or_path: str) -> CasingResponses:
     """The responses shipped under a name, or in a file of one's own (.npz)."""
-    path = Path(name_or_path)
-    if path.suffix == ".npz":
-        return load_responses(path)
-    known = sorted(file.stem for file in SHIPPED.glob("*.npz"))
-    if name_or_path not in known:
-        expected = f"one of {', '.join(known)}, or the path of a .npz file"
-        raise InputError("responses", "", name_or_path, expected)
-    return load_responses(SHIPPED / f"{name_or_path}.npz")
+    return load_responses(find_archive(name_or_path, SHIPPED, "responses"))
 
 
 def save_responses(responses: CasingResponses, path: Path) -> None:
@@ -40,31 +32,18 @@ def save_responses(responses: CasingResponses, path: Path) -> None:
         "valid_hz": responses.valid_hz,
         "provenance": dict(responses.provenance),
     }
-    arrays = {name: getattr(responses, name) for name in _ARRAYS}
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
-    part.replace(path)
+    write_archive(path, about, {name: getattr(responses, name) for name in _ARRAYS})
 
 
 def load_responses(path: Path) -> CasingResponses:
     """Read what `save_responses` wrote; InputError if it is missing, damaged or of another kind."""
-    where = str(path)
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            about = json.loads(str(stored["about"]))
-            if about.get("responses") != FORMAT:
-                expected = f"responses of format {FORMAT}, as `gearsim casing responses` writes them"
-                raise InputError(where, "", about.get("responses", "another kind of file"), expected)
-            arrays = {name: np.array(stored[name], dtype=np.float64) for name in _ARRAYS}
-        return _checked(about, arrays, where)
-    except FileNotFoundError:
-        raise InputError(where, "", "no such file", "responses of a casing (.npz)") from None
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        expected = "responses of a casing, as `gearsim casing responses` writes them"
-        raise InputError(where, "", f"{type(error).__name__}: {error}", expected) from None
+    expected = "responses of a casing, as `gearsim casing responses` writes them"
+    with read_archive(path, "responses of a casing", expected) as (about, stored):
+        if about.get("responses") != FORMAT:
+            expected = f"responses of format {FORMAT}, as `gearsim casing responses` writes them"
+            raise InputError(str(path), "", about.get("responses", "another kind of file"), expected)
+        arrays = {name: np.array(stored[name], dtype=np.float64) for name in _ARRAYS}
+        return _checked(about, arrays, str(path))
 
 
 def _checked(about: Mapping[str, Any], arrays: Mapping[str, Any], where: str) -> CasingResponses:

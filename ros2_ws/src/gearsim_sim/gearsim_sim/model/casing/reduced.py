@@ -10,8 +10,6 @@ mass-normalised modes with the masters held. Axes are the gearbox's: x across th
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
+from gearsim_sim.archive import find_archive, read_archive, write_archive
 
 Array = NDArray[np.float64]
 
@@ -136,14 +135,7 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float) -> Array:
 
 def find_reduced(name_or_path: str) -> ReducedCasing:
     """The reduced casing shipped under a name, or in a file of one's own (.npz)."""
-    path = Path(name_or_path)
-    if path.suffix == ".npz":
-        return load_reduced(path)
-    known = sorted(file.stem for file in SHIPPED.glob("*.npz"))
-    if name_or_path not in known:
-        expected = f"one of {', '.join(known)}, or the path of a .npz file"
-        raise InputError("reduced casing", "", name_or_path, expected)
-    return load_reduced(SHIPPED / f"{name_or_path}.npz")
+    return load_reduced(find_archive(name_or_path, SHIPPED, "reduced casing"))
 
 
 def save_reduced(casing: ReducedCasing, path: Path) -> None:
@@ -157,43 +149,29 @@ def save_reduced(casing: ReducedCasing, path: Path) -> None:
         "feet": {foot.name: foot.stiffness_n_per_m for foot in casing.feet},
         "provenance": dict(casing.provenance),
     }
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        np.savez_compressed(
-            file,
-            about=np.array(json.dumps(about)),
-            positions_m=casing.positions_m,
-            mass=casing.mass,
-            stiffness=casing.stiffness,
-            damping=casing.damping,
-            site_directions=np.array([site.direction for site in casing.sites]).reshape(-1, 3),
-            site_positions_m=np.array([site.position_m for site in casing.sites]).reshape(-1, 3),
-            site_rows=np.array([site.rows for site in casing.sites]).reshape(-1, casing.size),
-            foot_rows=np.array([foot.rows for foot in casing.feet]).reshape(-1, casing.size),
-            site_corrections=np.array([site.correction for site in casing.sites]).reshape(
-                -1, 6 * len(casing.masters)
-            ),
-        )
-    part.replace(path)
+    arrays = {
+        "positions_m": casing.positions_m,
+        "mass": casing.mass,
+        "stiffness": casing.stiffness,
+        "damping": casing.damping,
+        "site_directions": np.array([site.direction for site in casing.sites]).reshape(-1, 3),
+        "site_positions_m": np.array([site.position_m for site in casing.sites]).reshape(-1, 3),
+        "site_rows": np.array([site.rows for site in casing.sites]).reshape(-1, casing.size),
+        "foot_rows": np.array([foot.rows for foot in casing.feet]).reshape(-1, casing.size),
+        "site_corrections": np.array([site.correction for site in casing.sites]).reshape(
+            -1, 6 * len(casing.masters)
+        ),
+    }
+    write_archive(path, about, arrays)
 
 
 def load_reduced(path: Path) -> ReducedCasing:
     """Read what `save_reduced` wrote; InputError if it is missing, damaged or of another kind."""
-    where = str(path)
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        about = json.loads(str(arrays.pop("about")))
+    expected = "a reduced casing, as `gearsim casing reduce` writes it"
+    with read_archive(path, "a reduced casing", expected) as (about, arrays):
         if about["format"] != FORMAT:
-            raise InputError(where, "format", about["format"], f"{FORMAT}")
-        return _checked(_casing(about, arrays), where)
-    except FileNotFoundError:
-        raise InputError(where, "", "no such file", "a reduced casing (.npz)") from None
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        expected = "a reduced casing, as `gearsim casing reduce` writes it"
-        raise InputError(where, "", f"{type(error).__name__}: {error}", expected) from None
+            raise InputError(str(path), "format", about["format"], f"{FORMAT}")
+        return _checked(_casing(about, arrays), str(path))
 
 
 def _casing(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> ReducedCasing:
