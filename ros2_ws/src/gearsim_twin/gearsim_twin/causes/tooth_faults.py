@@ -44,19 +44,20 @@ def tooth_starts(
     average over the carrier's turn tells that single teeth do more than the model's; then each part is
     tried with a fault of a usual size.
     """
-    starts: list[dict[str, float | str]] = []
-    for match in found[:most]:
-        tooth = str(1 + round(match.angle_turns * match.part.teeth))
-        side: dict[str, float | str] = {"side": match.part.side} if match.part.side else {}
-        starts.append({"component": match.part.name, size: match.value, "tooth": tooth, **side})
+    starts = [
+        _start(match.part, size, match.sign * match.value, 1 + round(match.angle_turns * match.part.teeth))
+        for match in found[:most]
+    ]
     if not has_planets(context.contents[0]) or not _teeth_stand_out(context):
         return starts
     tried = {(start["component"], start.get("side", "")) for start in starts}
-    for part in parts:
-        if (part.name, part.side) not in tried:
-            own: dict[str, float | str] = {"side": part.side} if part.side else {}
-            starts.append({"component": part.name, size: usual, "tooth": "1", **own})
+    starts += [_start(part, size, usual, 1) for part in parts if (part.name, part.side) not in tried]
     return starts[:_MOST_STARTS]
+
+
+def _start(part: Part, size: str, value: float, tooth: int) -> dict[str, float | str]:
+    side: dict[str, float | str] = {"side": part.side} if part.side else {}
+    return {"component": part.name, size: value, "tooth": str(tooth), **side}
 
 
 def _teeth_stand_out(context: Context) -> bool:

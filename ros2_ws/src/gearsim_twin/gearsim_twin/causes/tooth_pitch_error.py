@@ -46,10 +46,7 @@ class ToothPitchError:
         """The wheels of which one tooth out of its place answers most, and which tooth."""
         parts = parts_of(context.contents[0], "tooth_pitch_error")
         found = matches(context, parts, self._build, _UNIT_M, _BOUNDS, angle="tooth", signed=True)
-        starts = tooth_starts(context, found, parts, "error_m", _UNIT_M, _MOST)
-        for start, match in zip(starts, found[:_MOST], strict=False):
-            start["error_m"] = match.sign * match.value
-        return starts
+        return tooth_starts(context, found, parts, "error_m", _UNIT_M, _MOST)
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With one tooth out of its place."""
