@@ -10,12 +10,13 @@ from gearsim_bringup.casing_results import RESULTS
 from gearsim_bringup.casing_results.envelopes import BANDS_HZ, envelope_of, expected_hz, lines_of
 from gearsim_bringup.casing_results.extended import compared
 from gearsim_bringup.casing_results.mesh_lines import MESH_HZ, case_signal, clarity_of, force_per_error
-from gearsim_bringup.casing_results.page import make_results, put_into, result
+from gearsim_bringup.casing_results.page import make_results, result
 from gearsim_bringup.casing_results.records import FAULTS, IN_CASING, RATE_HZ, Records, Run
 from gearsim_bringup.casing_results.sizes import GOOD, run_of, sizing_of
 from gearsim_bringup.casing_results.spectra import RIG_SEED, band_levels, misfit_db
 from gearsim_bringup.method_figures.style import LARGEST_BYTES
 from gearsim_io.errors import InputError
+from gearsim_io.page_marks import put_into
 
 DOCS = Path(__file__).parents[2] / "docs"
 SECONDS = 4.0

@@ -120,13 +120,15 @@ def parameters(scenario: Scenario) -> Any:
 
 def _engine(scenario: Scenario) -> RunningModel:
     from gearsim_sim.engine import Engine
-    from gearsim_sim.frf.model import ResponseModel
-    from gearsim_sim.frf.of_machine import machine_responses
 
     params = parameters(scenario)
     looked_at = [site for row in scenario.sensors.accelerometers for site, _ in row.looks_at]
     through = [place for site in looked_at if (place := place_of(site)) is not None]
-    responses = machine_responses(params) if through else None
+    responses = None
+    if through:
+        from gearsim_sim.frf.of_machine import machine_responses
+
+        responses = machine_responses(params)
     engine = Engine(
         params,
         scenario.seed,
@@ -140,7 +142,11 @@ def _engine(scenario: Scenario) -> RunningModel:
         forces=bool(through),
         settling=bool(through),
     )
-    return engine if responses is None else ResponseModel(engine, responses, through)
+    if responses is None:
+        return engine
+    from gearsim_sim.frf.model import ResponseModel
+
+    return ResponseModel(engine, responses, through)
 
 
 MODELS: Mapping[str, Callable[[Scenario], RunningModel]] = dict.fromkeys(_PARAMETERS, _engine)

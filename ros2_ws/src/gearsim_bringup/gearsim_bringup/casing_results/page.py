@@ -11,8 +11,9 @@ from gearsim_bringup.casing_results import RESULTS
 from gearsim_bringup.casing_results.records import Records
 from gearsim_bringup.method_figures.style import save, styled
 from gearsim_io.errors import InputError
+from gearsim_io.page_marks import check_marks, put_into
 
-__all__ = ["make_results", "put_into", "result"]
+__all__ = ["make_results", "result"]
 
 
 def result(name: str) -> Any:
@@ -52,7 +53,7 @@ def make_results(
     chosen = [(name, result(name)) for name in only or RESULTS]
     if page is not None:
         for name, _ in chosen:
-            _parts(page, name)  # refused before anything is simulated
+            check_marks(page, name)  # refused before anything is simulated
     files = []
     for number, (name, module) in enumerate(chosen):
         progress(number, len(chosen), name)
@@ -65,20 +66,3 @@ def make_results(
         if page is not None:
             put_into(page, name, module.table(told))
     return [*files, *([page] if page is not None else [])]
-
-
-def put_into(page: Path, name: str, lines: Sequence[str]) -> None:
-    """Replace what stands between the two marks of that name; InputError if they are not there."""
-    before, after = _parts(page, name)
-    page.write_text("\n".join([before, *lines, after]), encoding="utf-8")
-
-
-def _parts(page: Path, name: str) -> tuple[str, str]:
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    if not page.is_file():
-        raise InputError(str(page), "", "no such file", "a page with marks for tables")
-    text = page.read_text(encoding="utf-8")
-    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-        raise InputError(str(page), "marks", "none", f"one line {begin} and one {end} after it")
-    first, last = text.index(begin) + len(begin), text.index(end)
-    return text[:first], text[last:]

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+from gearsim_io.page_marks import put_into, standing
+
+MARKS = "measured"  # of the table in its page
 
 
 @dataclass(frozen=True)
@@ -78,26 +80,13 @@ def measured(table: Table, models: Sequence[str]) -> Iterator[str]:
 def add_missing(table: Table, models: Sequence[str], page: Path) -> Iterator[str]:
     """Enter the rows that a page lacks, and yield them."""
     known = {start: "" for start, _ in table.rows(())}
-    for line in standing(page):
+    for line in standing(page, MARKS):
         known |= {start: line for start in known if line.startswith(start)}
     for start, measure in table.rows(models):
         if not known[start]:
             known[start] = measure()
-            put_into(page, [*table.head, *(line for line in known.values() if line)])
+            put_into(page, MARKS, [*table.head, *(line for line in known.values() if line)])
             yield known[start]
-
-
-def standing(page: Path) -> list[str]:
-    """Lines between the marks."""
-    return page.read_text(encoding="utf-8").split(BEGIN)[1].split(END)[0].splitlines()
-
-
-def put_into(page: Path, lines: Sequence[str]) -> None:
-    """Replace what stands between the marks."""
-    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
-    after = rest.split(END)[1]
-    text = "\n".join(lines)
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -116,7 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(line, flush=True)
         lines.append(line)
     if given.into is not None and not given.missing:
-        put_into(given.into, lines)
+        put_into(given.into, MARKS, lines)
     return 0
 
 
