@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from blind import motion
+from blind import motion, sizing
 from blind.chain import sampled
 from blind.effects import CAUSES, EFFECTS, SEVERITIES, noise_of, size_of
 from blind.making import Hidden, build_of, make, place_in
@@ -188,3 +188,32 @@ def test_plans_of_one_rig_are_of_that_rig() -> None:
 
 def _sizes(name: str, rig: str) -> list[float]:
     return [size for s in SEVERITIES if (size := size_of(name, rig, s)) is not None]
+
+
+@pytest.mark.parametrize(("most_db", "target_db"), [(20.9, 24.0), (17.0, 24.0), (30.0, 24.0)])
+def test_what_a_machine_hardly_reaches_is_enough(
+    monkeypatch: pytest.MonkeyPatch, most_db: float, target_db: float
+) -> None:
+    """An effect whose level grows with its size, to `most_db` and no further."""
+    tried: list[float] = []
+
+    def levels_off(_rig: str, effect: tuple[str, float], *_: object) -> float:
+        tried.append(effect[1])
+        return min(most_db, 30.0 + 20.0 * np.log10(effect[1] / 1e-3))
+
+    monkeypatch.setattr(sizing, "stands_out", levels_off)
+    asked = (
+        "parallel",
+        "bearing_spall_outer",
+        target_db,
+        3e-4,
+        10.0,
+        (1,),
+        np.zeros((1, 8), dtype=np.float32),
+    )
+    if most_db < 0.8 * target_db:
+        with pytest.raises(sizing.OutOfReachError, match="by 17"):
+            sizing.search(*asked)
+        return
+    found = levels_off("", ("", sizing.search(*asked)))
+    assert found == pytest.approx(min(most_db, target_db), abs=3.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from gearsim_sim.simulation import to_record
 from gearsim_twin.causes.cause import Parameter
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.judge import judge
+from gearsim_twin.judge import Bench, judge
 from gearsim_twin.settings import Settings
 
 WIDTH_M = 8e-4
@@ -173,3 +174,30 @@ def test_whoever_listens_may_stop_it():
 
     with pytest.raises(KeyboardInterrupt):
         judge(case(seconds=2.0), QUICK, tell=stop, causes=())
+
+
+def test_what_chance_does_is_simulated_once_under_each_condition(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three records for training, two of them at 10 Hz: each seed is run at 10 Hz and at 14 Hz."""
+    speeds = (10.0, 14.0, 10.02, 14.01)
+    run: list[tuple[int, int]] = []
+
+    def seeded(jobs, _then, _seconds):
+        run.extend((record, seed) for record, _, seed in jobs)
+        return [record for record, _, _ in jobs]
+
+    bench = Bench(
+        case=SimpleNamespace(
+            machine=SimpleNamespace(gear_meshes=("mesh",)), training=[SimpleNamespace(seconds=1.0)]
+        ),
+        simulator=SimpleNamespace(seeded=seeded),
+        views=tuple(SimpleNamespace(speed_hz=speed) for speed in speeds),
+        nominal=({"operating_point": {"load": {"value": 5.0}}},) * len(speeds),
+        plan=None,
+        search=None,
+        settings=Settings(gear_seeds=2),
+    )
+    monkeypatch.setattr("gearsim_twin.judge.least_seconds", lambda _: 0.1)
+    monkeypatch.setattr("gearsim_twin.judge.realisations_of", tuple)
+    known = bench.chance((0, 1, 2, 3), 3, None)
+    assert run == [(0, 1), (0, 2), (1, 1), (1, 2)]
+    assert known == {0: (0, 0), 1: (1, 1), 2: (0, 0), 3: (1, 1)}

@@ -59,7 +59,8 @@ off, teeth, noise, gain, speed, load and angles of its own; two records to learn
 is `gearsim twin`, in a process that sees the records only; each file it opens is checked. *Mild*, *medium*,
 *strong* stand {levels} dB out of noise and machine on the very machine of the case, by one yardstick for all
 effects (`tests/twin/blind/severity.py`, `sizing.py`); gains are 6, 12, 19.8 dB; labels, swings of the speed,
-clipping, dropouts and play have given sizes. What no size brings so far out on a rig is not hidden there.
+clipping, dropouts and play have given sizes. Where a machine shows no more than four fifths of the decibels
+at any size (a pit wider than what a ball bridges), that is enough; what stays below is not hidden there.
 `oil_film` is not among the effects: on sound bearings it changes what is below any sensor's noise. What
 shapes the vibration of the bearing rig (gains, roll-off, resonances of sensor and casing) is measured with
 quiet sensors (10 ug/sqrt(Hz)), its spalls in a loud hall. Of a noise floor the judge cannot know how high it

@@ -21,6 +21,8 @@ _NEAR_DB, _NEAR = 1.5, 0.125  # or that part of the target
 _TRIES = 8
 _SLOPES = (4.0, 60.0)  # dB per decade, of what changes at all
 _FAR = 1.0  # decades in one step
+# What no size of an effect reaches on a machine, the largest does by this part of the way or not at all.
+_ENOUGH = 0.8
 
 
 class OutOfReachError(LookupError):
@@ -77,7 +79,11 @@ def search(
     seed: tuple[int, ...],
     plain: NDArray[np.float32],
 ) -> float:
-    """As `size_for`, for any number of dB, from a first size."""
+    """As `size_for`, for any number of dB, from a first size.
+
+    Pits that are wider than what an element bridges stand out no more: where the most that an effect does is
+    four fifths of what is asked for, that is enough.
+    """
     effect = EFFECTS[name]
     low, high = float(np.log10(effect.low)), float(np.log10(effect.high))
     grows = -1.0 if effect.shrinks else 1.0
@@ -96,6 +102,8 @@ def search(
         if any(abs(at - place) < 1e-3 for place, _ in found):
             break
     nearest = min(found, key=lambda one: abs(one[1] - target_db), default=(0.0, 0.0))
+    if _ENOUGH * target_db <= nearest[1] <= target_db:
+        return float(f"{10 ** nearest[0]:.4g}")
     raise OutOfReachError(f"{name} on {rig} stands out by {nearest[1]:.1f} dB, not by {target_db:g}")
 
 

@@ -116,21 +116,24 @@ class Bench:
             training=tuple(range(training)),
             run=run,
             nuisances=measuring_chain(plan, self.case.levels_known),
-            chance=self._chance(numbers, training, plan),
+            chance=self.chance(numbers, training, plan),
             numbers=numbers,
         )
 
-    def _chance(self, numbers: Sequence[int], training: int, plan: Plan) -> dict[int, Realisations]:
-        """What chance does to each record: that of the record for training with the most similar speed."""
+    def chance(self, numbers: Sequence[int], training: int, plan: Plan) -> dict[int, Realisations]:
+        """What chance does to each record: learnt once under each condition, on records for training."""
         geared = self.case.machine.gear_meshes or self.case.machine.planetary_stages
         number = self.settings.gear_seeds if geared else self.settings.seeds
         seeds = range(self.settings.seed, self.settings.seed + number)
-        jobs = [(numbers[k], self.nominal[numbers[k]], seed) for k in range(training) for seed in seeds]
+        learnt: list[int] = []
+        for own in numbers[:training]:
+            if all(self._apart(own, other) >= _ANOTHER for other in learnt):
+                learnt.append(own)
+        jobs = [(own, self.nominal[own], seed) for own in learnt for seed in seeds]
         found = self.simulator.seeded(jobs, partial(features, plan=plan), self.seconds)
-        rows = [found[k * len(seeds) : (k + 1) * len(seeds)] for k in range(training)]
+        rows = [found[k * len(seeds) : (k + 1) * len(seeds)] for k in range(len(learnt))]
         known = [realisations_of(row) for row in rows]
-        speeds = [self.views[number].speed_hz for number in numbers]
-        nearest = [min(range(training), key=lambda k: abs(speeds[k] - own)) for own in speeds]
+        nearest = [min(range(len(learnt)), key=lambda k: self._apart(own, learnt[k])) for own in numbers]
         return {record: known[k] for record, k in enumerate(nearest)}
 
     def told(self) -> tuple[int, ...]:
@@ -147,7 +150,8 @@ class Bench:
 
     def _apart(self, one: int, other: int) -> float:
         """How different the conditions of two records are: speed, load and force by their ratios."""
-        pairs = zip(_conditions(self.nominal[one]), _conditions(self.nominal[other]), strict=True)
+        both = ((self.views[k].speed_hz, *_conditions(self.nominal[k])) for k in (one, other))
+        pairs = zip(*both, strict=True)
         return sum(abs(math.log(max(a, 1e-9) / max(b, 1e-9))) for a, b in pairs)
 
     def heldout(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
@@ -286,12 +290,11 @@ def _prior(bench: Bench, tuning: Tuning, tell: Tell) -> Prior:
     return calibrated(bench.workbench(healthy, len(healthy), bench.search), prior)
 
 
-def _conditions(content: Content) -> tuple[float, float, float]:
-    """Speed, load and radial force under which a model runs."""
+def _conditions(content: Content) -> tuple[float, float]:
+    """Load and radial force under which a model runs."""
     point = content.get("operating_point", {})
     force = content.get("parameters", {}).get("radial_load", {})
-    speed, load = point.get("speed", {}), point.get("load", {})
-    return _number(speed), _number(load), _number(force)
+    return _number(point.get("load", {})), _number(force)
 
 
 def _number(entry: Any) -> float:
