@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from gearsim_sim.integrate.compiled import apart, inlined
+from gearsim_sim.integrate.compiled import apart, embedded
 from gearsim_sim.integrate.pieces import ramp, table_value
 from gearsim_sim.model.loop_data import SEVERITY_COLUMNS, Array, BearingMemory, Bearings, Drive, Indices
 
@@ -33,7 +33,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S11, _S27, _S30, _S31 = np.uint64(11), np.uint64(27), np.uint64(30), np.uint64(31)
 
 
-@inlined
+@embedded
 def severity(row: Array, step: int) -> float:
     """Severity of a row of a table at a step."""
     rise, _, _ = ramp(float(step) - row[2], row[3])
@@ -41,7 +41,7 @@ def severity(row: Array, step: int) -> float:
     return value
 
 
-@inlined
+@embedded
 def knot_value(key: int, knot: int) -> float:
     """See `cage_slip.knot_value`."""
     state = np.uint64(key) + np.uint64(knot + 1) * _GOLDEN
@@ -51,7 +51,7 @@ def knot_value(key: int, knot: int) -> float:
     return value
 
 
-@inlined
+@embedded
 def jitter(key: int, position: float, first_knot: int) -> float:
     """See `cage_slip.jitter`; `first_knot` is that at position zero."""
     whole = math.floor(position)
@@ -61,7 +61,7 @@ def jitter(key: int, position: float, first_knot: int) -> float:
     return knot_value(key, knot) * (1.0 - rise) + knot_value(key, knot + 1) * rise
 
 
-@inlined
+@embedded
 def rest_terms(memory: BearingMemory, now: Array) -> None:
     """`now` without faults: cages keep what they have fallen behind."""
     for b in range(now.shape[0]):
@@ -71,7 +71,7 @@ def rest_terms(memory: BearingMemory, now: Array) -> None:
         now[b, SPIN] = -memory.cage[b, SPIN_LAG]
 
 
-@inlined
+@embedded
 def enter_slip(row: Array, level: float, way: float, cage: Array, cage_rate: float, spin_rate: float) -> None:
     """Let a cage and its balls fall behind the kinematic way of this step; `way` is the reference shaft's."""
     share = level * row[_OWN + 2] / (1.0 + cage[MEAN_FORCE] / row[_OWN + 3])
@@ -83,7 +83,7 @@ def enter_slip(row: Array, level: float, way: float, cage: Array, cage_rate: flo
     cage[SPIN_LAG] = lag - math.floor(lag)
 
 
-@inlined
+@embedded
 def enter_play(row: Array, level: float, way: float, play: Array) -> None:
     """Move balls within their pockets, each by a random function of its own [turns]."""
     for j in range(play.size):
@@ -133,7 +133,7 @@ def enter_terms(
             memory.cage[b, WAY] += abs(drive.rates[bearings.places[b, 2]] * way)
 
 
-@inlined
+@embedded
 def turn_balls(b: int, bearings: Bearings, memory: BearingMemory) -> None:
     """Cosines and sines of the balls with their play in the pockets."""
     for j in range(memory.play.shape[1]):
@@ -145,7 +145,7 @@ def turn_balls(b: int, bearings: Bearings, memory: BearingMemory) -> None:
         memory.sines[b, j] = bearings.sines[b, j] * c + bearings.cosines[b, j] * s
 
 
-@inlined
+@embedded
 def spall_place(
     row: Array, phases: Array, cage_ahead: float, spin_ahead: float, bearings: Bearings
 ) -> tuple[int, float]:
@@ -166,7 +166,7 @@ def spall_place(
     return ball, away
 
 
-@inlined
+@embedded
 def rounded_drop(away: float, row: Array) -> float:
     """See `pit.rounded_drop`."""
     past = row[_OWN + 6] - abs(away)
@@ -181,7 +181,7 @@ def rounded_drop(away: float, row: Array) -> float:
     return reached
 
 
-@inlined
+@embedded
 def step_fraction(away: float, row: Array, way: float, drive: Drive, bearings: Bearings) -> float:
     """Part of this step in a rectangular pit, see `pit.inside_fraction`; `way` is the reference shaft's."""
     rate = row[_OWN + 4] * drive.rates[int(row[_OWN + 3])]
@@ -265,7 +265,7 @@ def enter_profiles(
                 memory.missing[b, ball] += level * value
 
 
-@inlined
+@embedded
 def place_spalls(
     step: int, phases: Array, drive: Drive, bearings: Bearings, missing: Array, touched: Indices
 ) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from gearsim_sim.integrate.compiled import inlined
+from gearsim_sim.integrate.compiled import embedded
 from gearsim_sim.integrate.pieces import polynomial
 from gearsim_sim.model.loop_data import Array, Data, Drive, Part
 
 
-@inlined
+@embedded
 def reference_motion(
     step: int, drive: Drive, per_step: float, per_second: float
 ) -> tuple[float, float, float]:
@@ -21,7 +21,7 @@ def reference_motion(
     return turns, slope * per_second, curvature * (per_second * per_second)
 
 
-@inlined
+@embedded
 def known_inputs(step: int, change_hz_per_s: float, drive: Drive, data: Data, inputs: Array) -> None:
     """Torques of motor and load and the weight, into `inputs`.
 
@@ -36,7 +36,7 @@ def known_inputs(step: int, change_hz_per_s: float, drive: Drive, data: Data, in
     inputs[2] = data.gravity
 
 
-@inlined
+@embedded
 def apply_known(inputs: Array, part: Part, s: Array, sites: Array, nm: int) -> None:
     """Known inputs as modal forces of a part (in `s`) and as accelerations of its sites."""
     n2 = 2 * nm

@@ -16,7 +16,7 @@ from gearsim_sim.integrate.carrier_kernel import (
     mode_without_force,
     structure_force,
 )
-from gearsim_sim.integrate.compiled import apart, inlined
+from gearsim_sim.integrate.compiled import apart, embedded
 from gearsim_sim.integrate.pieces import ramp
 from gearsim_sim.model.loop_data import SEVERITY_COLUMNS, Array
 from gearsim_sim.model.side_data import Side
@@ -26,7 +26,7 @@ _FOOT, _OSC = SEVERITY_COLUMNS, SEVERITY_COLUMNS
 FORCE, KNOWN, PLACE, RATE = 0, 1, 2, 3
 
 
-@inlined
+@embedded
 def severity_of(row: Array, step: int) -> float:
     """Severity of a row of a table at a step."""
     rise, _, _ = ramp(float(step) - row[2], row[3])
@@ -34,14 +34,14 @@ def severity_of(row: Array, step: int) -> float:
     return value
 
 
-@inlined
+@embedded
 def extrapolated(state: Array, at: int) -> float:
     """The next of three equally spaced values, newest first, by a parabola."""
     value: float = 3.0 * (state[at] - state[at + 1]) + state[at + 2]
     return value
 
 
-@inlined
+@embedded
 def remember(state: Array, at: int, value: float) -> None:
     """Put the newest of three values."""
     state[at + 2] = state[at + 1]
@@ -49,7 +49,7 @@ def remember(state: Array, at: int, value: float) -> None:
     state[at] = value
 
 
-@inlined
+@embedded
 def rounded_corner(x: float, width: float) -> tuple[float, float]:
     """max(x, 0) with a corner rounded over +-width, and its slope."""
     if x <= -width:
@@ -60,7 +60,7 @@ def rounded_corner(x: float, width: float) -> tuple[float, float]:
     return t * t / (4.0 * width), t / (2.0 * width)
 
 
-@inlined
+@embedded
 def foot_force(row: Array, step: int, y: float, rate: float) -> float:
     """Force of a loose foot beyond the linear base."""
     share: float = -math.expm1(severity_of(row, step) * row[_FOOT + 3])
@@ -101,7 +101,7 @@ def guess_forces(side: Side, q: Array, rates: Array, sc: Array, nc: int, ic: int
                 sc[free_motion(nc, ic) + i] += side.structure_motions[d, i] * force
 
 
-@inlined
+@embedded
 def places(side: Side, s: Array, start: int, n2: int) -> None:
     """Add what the predicted modes of a part say of displacements and rates of the directions."""
     for d in range(side.now.shape[1]):
@@ -146,7 +146,7 @@ def push_carried(side: Side, s: Array, carrier: Carrier, nc: int) -> None:
                 s[known + m] += side.structure_rows[d, m] * force
 
 
-@inlined
+@embedded
 def place_of(side: Side, d: int) -> tuple[float, float]:
     """Displacement and rate of a direction under all forces of `Side.now`."""
     place, rate = side.now[PLACE, d], side.now[RATE, d]
@@ -156,7 +156,7 @@ def place_of(side: Side, d: int) -> tuple[float, float]:
     return place, rate
 
 
-@inlined
+@embedded
 def advance_oscillator(side: Side, j: int, step: int) -> None:
     """New motion of an oscillator and its new forces, in place of the extrapolated ones."""
     row, pole, state = side.oscillators[j], side.poles[j], side.state[side.feet.shape[0] + j]

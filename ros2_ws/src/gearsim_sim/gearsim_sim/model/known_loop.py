@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from gearsim_sim.integrate.compiled import apart, inlined
+from gearsim_sim.integrate.compiled import apart, embedded
 from gearsim_sim.integrate.pieces import cosine_sine, polynomial
 from gearsim_sim.model.joint_loop import KNOWN, remember, severity_of
 from gearsim_sim.model.loop_data import SEVERITY_COLUMNS, Array, Data, Drive
@@ -28,7 +28,7 @@ _ROOT_HALF = math.sqrt(0.5)
 ANGLE, SPEED = 5, 6
 
 
-@inlined
+@embedded
 def rotating_force(
     row: Array, step: int, speed_hz: float, change: float, phases: Array, rates: Array, data: Data
 ) -> float:
@@ -80,7 +80,7 @@ def known_forces(
     follow(side, torque / data.inertia, data.step_s)
 
 
-@inlined
+@embedded
 def restore_base(fresh: bool, side: Side, s0: Array, s1: Array, n0: int, n1: int) -> None:
     """Known modal forces of motor, load and weight: keep them, or put back those that were kept."""
     if fresh:
@@ -95,7 +95,7 @@ def restore_base(fresh: bool, side: Side, s0: Array, s1: Array, n0: int, n1: int
             s1[2 * n1 + m] = side.base[n0 + m]
 
 
-@inlined
+@embedded
 def follow(side: Side, push: float, step_s: float) -> None:
     """The rigid rotation's way beyond its course after a step under torque / inertia."""
     drift, pole = side.drift, side.drift_pole

@@ -22,7 +22,7 @@ from gearsim_sim.integrate.carrier_kernel import (
     damper_force,
     ring_motion,
 )
-from gearsim_sim.integrate.compiled import compiled, inlined
+from gearsim_sim.integrate.compiled import compiled, embedded
 from gearsim_sim.integrate.kernel import (
     advance,
     correct,
@@ -81,7 +81,7 @@ def make_work(data: Data, drive: Drive, interfaces: int) -> Work:
     )
 
 
-@inlined
+@embedded
 def move_phases(drive: Drive, passed: float, phases: Array) -> None:
     """Angles of all tracks in turns, within [0, 1)."""
     for j in range(phases.size & 0xFFFF):
@@ -89,7 +89,7 @@ def move_phases(drive: Drive, passed: float, phases: Array) -> None:
         phases[j] = turns - np.floor(turns)  # math.floor makes an integer, which fills no vector registers
 
 
-@inlined
+@embedded
 def put_states(s: Array, part: Part, row: Array, at: int) -> int:
     """State rows of a part into an output row; returns the place behind them."""
     for j in range(part.state_rows.shape[0]):
@@ -98,7 +98,7 @@ def put_states(s: Array, part: Part, row: Array, at: int) -> int:
     return behind
 
 
-@inlined
+@embedded
 def put_carrier_states(s: Array, carrier: Carrier, row: Array, at: int, nc: int, ni: int) -> int:
     """State rows of the carrying structure into an output row; returns the place behind them."""
     for j in range(carrier.state_rows.shape[0]):
@@ -107,7 +107,7 @@ def put_carrier_states(s: Array, carrier: Carrier, row: Array, at: int, nc: int,
     return behind
 
 
-@inlined
+@embedded
 def put_carrier_motion(
     s: Array, carrier: Carrier, row: Array, at: int, interfaces: int, nc: int, ni: int
 ) -> None:
@@ -117,7 +117,7 @@ def put_carrier_motion(
         row[at + interfaces + j] = ring_motion(s, j, nc, ni)
 
 
-@inlined
+@embedded
 def rotate_sites(phases: Array, data: Data, accel: Array, column: int) -> None:
     """Turn pairs of rows (x, y) into the direction of sensors that rotate against the model's frame."""
     for j in range(data.rotations.shape[0]):
@@ -148,9 +148,9 @@ def make_loop(
     n0, n1 = first_modes, second_modes
     i0, i1 = first_interfaces, second_interfaces
     rated = 1 if with_rates else 0
-    sided = 1 if with_side else 0
+    sided = with_side  # branches on constants are dropped before anything in them is compiled
     nc, ic = carrier_modes, carrier_interfaces
-    carried = 1 if nc > 0 else 0
+    carried = nc > 0
     q0_count, q1_count = (1 + rated) * i0, (1 + rated) * i1
 
     def run(
@@ -170,7 +170,7 @@ def make_loop(
         known0, known1, inputs = work.known0, work.known1, work.inputs
         now, jumps, meshes, nodes = work.now, work.jumps, work.meshes, work.nodes
         sites0, sites1 = known0.size, known1.size
-        swings = sided * side.swings
+        swings = side.swings if sided else 0
         rest_terms(memory, now)
         per_step = 1.0 / drive.length_steps
         per_second = per_step / data.step_s
@@ -189,7 +189,7 @@ def make_loop(
                 i = step - first - 1
                 turns, speed, change = reference_motion(step, drive, per_step, per_second)
                 passed = turns - anchor
-                for _ in range(sided):
+                if sided:
                     passed += side.drift[ANGLE]
                     speed += side.drift[SPEED]
                 move_phases(drive, passed, phases)
@@ -198,7 +198,7 @@ def make_loop(
                     known_inputs(step, change, drive, data, inputs)
                     apply_known(inputs, data.first, s0, known0, n0)
                     apply_known(inputs, data.second, s1, known1, n1)
-                for _ in range(sided):
+                if sided:
                     known_forces(
                         step, fresh, speed, change, phases, drive, data, side, s0, s1, 2 * n0, 2 * n1
                     )
@@ -216,9 +216,9 @@ def make_loop(
                     rates[j] = s0[q0 + i0 + j]
                 for j in range(rated * i1):
                     rates[i0 + j] = s1[q1 + i1 + j]
-                for _ in range(sided):
+                if sided:
                     guess_forces(side, q, rates, sc, nc, ic)
-                for _ in range(carried):
+                if carried:
                     carrier_motion(sc, data.carrier, q, forces, phases, data.circle, nc, ic)
                 bearing_forces(
                     step, q, phases, speed, drive, data.bearings, data.circle, memory, now, jumps, forces,
@@ -229,7 +229,7 @@ def make_loop(
                 for _ in range(1 - swings):
                     between_nodes(step - before, stride, data.step_s, nodes, meshes)
                 mesh_forces(step, q, rates, phases, speed, drive, data.meshes, meshes, forces)
-                for _ in range(carried):
+                if carried:
                     carry_forces(sc, data.carrier, q, forces, phases, data.circle, nc, ic)
                 remember_forces(s0, forces, 0, n0, i0)
                 remember_forces(s1, forces, i0, n1, i1)
@@ -243,18 +243,18 @@ def make_loop(
                     s1, data.second.k, data.second.length, known1, data.second.site_index, accel, column + i,
                     n1, i1,
                 )  # fmt: skip
-                for _ in range(carried):
+                if carried:
                     carrier_accelerations(sc, data.carrier, accel, column + i, nc, ic)
-                for _ in range(1 - sided):
+                if not sided:
                     advance(s0, data.first.k, forces, 0, n0, i0)
                     advance(s1, data.second.k, forces, i0, n1, i1)
-                for _ in range(sided):
+                if sided:
                     correct(s0, data.first.k, forces, 0, n0, i0)
                     correct(s1, data.second.k, forces, i0, n1, i1)
-                    for _ in range(carried):
+                    if carried:
                         carried_places(side, sc, data.carrier, nc, ic)
                     joint_forces(step, side, forces, s0, s1, 2 * n0, 2 * n1, accel, column + i)
-                    for _ in range(carried):
+                    if carried:
                         push_carried(side, sc, data.carrier, nc)
                     predict(s0, data.first.k, n0)
                     predict(s1, data.second.k, n1)
@@ -265,14 +265,14 @@ def make_loop(
                     row[1] = speed
                     at = put_states(s0, data.first, row, MOTION_COLUMNS)
                     at = put_states(s1, data.second, row, at)
-                    for _ in range(carried):
+                    if carried:
                         at = put_carrier_states(sc, data.carrier, row, at, nc, ic)
                     for j in range(i0 + i1):
                         row[at + j] = forces[j]
-                    for _ in range(carried):
+                    if carried:
                         put_carrier_motion(sc, data.carrier, row, at, i0 + i1, nc, ic)
                     samples += 1
-                for _ in range(carried):
+                if carried:
                     carrier_advance(sc, data.carrier, data.carrier.poles.size // 2, nc, ic)
             before = behind
         return samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gearsim_sim.integrate.compiled import inlined
+from gearsim_sim.integrate.compiled import embedded
 from gearsim_sim.integrate.pieces import table_value
 from gearsim_sim.model.bearing_loop import severity
 from gearsim_sim.model.loop_data import Array, Drive, Meshes
@@ -16,7 +16,7 @@ _OWN = 4  # first column behind those of the severity
 WORK_ROWS = 5
 
 
-@inlined
+@embedded
 def look_up(phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
     """Stiffness, error and its rate of all meshes without faults and pulses, straight from the tables."""
     for i in range(meshes.places.shape[0]):
@@ -26,7 +26,7 @@ def look_up(phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: 
         work[2, i] = speed_hz * rate
 
 
-@inlined
+@embedded
 def mesh_forces(
     step: int, q: Array, rates: Array, phases: Array, speed_hz: float, drive: Drive, meshes: Meshes,
     work: Array, forces: Array,
@@ -59,7 +59,7 @@ def mesh_forces(
             )
 
 
-@inlined
+@embedded
 def add_tooth_pulses(phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
     """Rectangular parts of the stiffness of meshes that have one."""
     for i in range(meshes.places.shape[0]):
@@ -71,7 +71,7 @@ def add_tooth_pulses(phases: Array, speed_hz: float, drive: Drive, meshes: Meshe
             work[0, i] += meshes.numbers[i, 6] * mean
 
 
-@inlined
+@embedded
 def add_mods(step: int, phases: Array, speed_hz: float, drive: Drive, work: Array) -> None:
     """What faults change of stiffness and transmission error, smoothly."""
     for j in range(drive.mesh_mods.shape[0]):
@@ -86,7 +86,7 @@ def add_mods(step: int, phases: Array, speed_hz: float, drive: Drive, work: Arra
             work[2, mesh] += now * speed_hz * drive.rates[track] * slope
 
 
-@inlined
+@embedded
 def pulse_area(place: float, width: float) -> float:
     """Integral from 0 to `place` of a function that is 1 from 0 to `width` in each period of 1."""
     whole = math.floor(place)
@@ -94,7 +94,7 @@ def pulse_area(place: float, width: float) -> float:
     return area
 
 
-@inlined
+@embedded
 def pulse_mean(place: float, length: float, width: float) -> float:
     """Mean of that function over `length` around `place`: its jumps become ramps of one step."""
     if length < 1e-12:
@@ -103,7 +103,7 @@ def pulse_mean(place: float, length: float, width: float) -> float:
     return mean
 
 
-@inlined
+@embedded
 def add_pulses(step: int, phases: Array, speed_hz: float, drive: Drive, meshes: Meshes, work: Array) -> None:
     """Rectangular changes by faults: their exact mean over one step, and that of their rate."""
     for j in range(drive.mesh_pulses.shape[0]):
@@ -123,7 +123,7 @@ def add_pulses(step: int, phases: Array, speed_hz: float, drive: Drive, meshes: 
                 work[2, mesh] += height * speed_hz * drive.rates[track] * (after - before) / length
 
 
-@inlined
+@embedded
 def add_terms(step: int, drive: Drive, work: Array) -> None:
     """What faults add to backlash and lead gap."""
     for j in range(drive.mesh_terms.shape[0]):
@@ -131,7 +131,7 @@ def add_terms(step: int, drive: Drive, work: Array) -> None:
         work[3 + int(row[_OWN + 1]), int(row[_OWN])] += severity(row, step) * row[_OWN + 2]
 
 
-@inlined
+@embedded
 def tooth_force(
     d: float, rate: float, stiffness: float, damping: float, backlash: float, gap: float
 ) -> float:
@@ -147,7 +147,7 @@ def tooth_force(
     return force + parting * sense * (elastic + max(-elastic, min(elastic, damper)))
 
 
-@inlined
+@embedded
 def flank(depth: float, stiffness: float, gap: float) -> tuple[float, float]:
     """Touching part of the face, and elastic force, of flanks pressed `depth` beyond touch."""
     if depth <= 0.0:

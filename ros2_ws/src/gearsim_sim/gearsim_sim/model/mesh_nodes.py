@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearsim_sim.integrate.compiled import inlined
+from gearsim_sim.integrate.compiled import embedded
 from gearsim_sim.integrate.pieces import table_value
 from gearsim_sim.model.loop_data import Array, Drive, Meshes
 from gearsim_sim.model.periodic import PeriodicSeries
@@ -62,7 +62,7 @@ def node_stride(order: float, segment: Segment) -> int:
     return stride
 
 
-@inlined
+@embedded
 def mesh_functions(i: int, phases: Array, drive: Drive, meshes: Meshes) -> tuple[float, float, float, float]:
     """Stiffness and error of a mesh, each with its slope per turn of the reference shaft; without faults."""
     track = meshes.places[i, 1]
@@ -79,7 +79,7 @@ def mesh_functions(i: int, phases: Array, drive: Drive, meshes: Meshes) -> tuple
     return stiffness, rising, error, rate
 
 
-@inlined
+@embedded
 def next_node(phases: Array, turns_per_step: float, drive: Drive, meshes: Meshes, nodes: Array) -> None:
     """The node behind becomes the one before; `phases` are those of the new one."""
     for i in range(nodes.shape[1]):
@@ -92,7 +92,7 @@ def next_node(phases: Array, turns_per_step: float, drive: Drive, meshes: Meshes
         nodes[7, i] = rate * turns_per_step
 
 
-@inlined
+@embedded
 def between_nodes(place: int, stride: int, step_s: float, nodes: Array, work: Array) -> None:
     """Stiffness, error and its rate per second into the first rows of `work`, `place` steps behind a node."""
     t = float(place) / float(stride)
