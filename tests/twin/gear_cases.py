@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gearsim_io.machines import load_machine, machine_file
+from gearsim_io.record import PulseTrain
 from gearsim_sim.scenario import parse_scenario
 from gearsim_sim.simulation import to_record
 from gearsim_twin.baseline import scenario_content
@@ -51,14 +55,23 @@ def fault(kind: str, component: str, **params: Any) -> dict[str, Any]:
 
 
 def gear_context(
-    model: str, *faults: dict[str, Any], seed: int = 7, machine: Path | None = None, **more: Any
+    model: str,
+    *faults: dict[str, Any],
+    seed: int = 7,
+    machine: Path | None = None,
+    mark_turns: float = 0.0,
+    **more: Any,
 ) -> Context:
-    """The nominal model beside a record with other random errors, noise, another stiffness, and faults."""
+    """The nominal model beside a record with other random errors, noise, another stiffness, and faults.
+
+    `mark_turns` is by how much the tacho's marks are late against the teeth.
+    """
     content = {**copy.deepcopy(BASES[model]), "seed": seed, "faults": list(faults), **more}
     if machine is not None:
         content["machine"] = str(machine)
     seconds = SECONDS[model] if machine is None else 5.1
     record = to_record(parse_scenario(content, Path("x.yaml")), seconds)
+    record = replace(record, tachos=tuple(_late(train, mark_turns) for train in record.tachos))
     plate = load_machine(content["machine"])
     case = make_case(plate, machine_file(content["machine"]), model, [record])
     views = case.views()[:1]
@@ -66,6 +79,12 @@ def gear_context(
     with Simulator(case, measured=views) as simulator:
         simulated = tuple(simulator.views(dict(enumerate(contents))))
     return Context(case, views, (), (), (), contents, simulated)
+
+
+def _late(train: PulseTrain, turns: float) -> PulseTrain:
+    """The same marks, further on in the turn; where a tacho begins to count is nobody's choice."""
+    step = np.median(np.diff(train.samples)) * train.pulses_per_revolution
+    return replace(train, samples=train.samples[:-8] + turns * step)
 
 
 def unlike_wheels(folder: Path) -> Path:

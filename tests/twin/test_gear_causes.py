@@ -17,7 +17,7 @@ from gearsim_twin.causes import CAUSES
 from gearsim_twin.causes.context import Context
 from gearsim_twin.causes.gear_model import Part
 from gearsim_twin.causes.matched import _by_angle
-from gearsim_twin.causes.turn_lines import Deviation
+from gearsim_twin.causes.turn_lines import Deviation, deviation
 
 PARALLEL = [
     "unbalance",
@@ -106,6 +106,17 @@ def test_the_wheel_its_tooth_and_its_size_are_named(
     assert guess["component"] == component
     assert guess[value] == pytest.approx(params[value], rel=0.25)
     assert "tooth" not in params or guess["tooth"] == str(params["tooth"])
+
+
+def test_where_the_mark_of_a_tacho_stands_against_the_teeth_does_not_matter():
+    """A third of a turn is no whole number of teeth: laid over each other by marks nothing would agree."""
+    worn = fault("gear_wear", "gears.gear", depth_m=1e-5)
+    for mark_turns in (0.0, 0.33):
+        plain = deviation(gear_context("lpm34", seed=3, mark_turns=mark_turns), 0, 1.0)
+        assert plain is not None
+        assert np.mean(plain.excess[:2] > 10.0) < 0.03
+        guess = first("tooth_wear", gear_context("lpm34", worn, mark_turns=mark_turns))
+        assert guess["depth_m"] == pytest.approx(1e-5, rel=0.25)
 
 
 def test_play_shows_where_the_load_does_not_hold_the_teeth_together():

@@ -1,9 +1,11 @@
 """How strong an effect is in a record: its simulated answer is laid over the deviation of the record.
 
 With the deviation D and the answer U of a guess (both complex lines of a turn, variance v), turned by the
-angle phi, the amplitude is a = Re sum conj(U) D / v over sum |U|^2 / v, and the drop of the weighted squares
-a^2 times the latter. Turning a wheel against its mates by whole teeth, or a run-out by any angle, turns lines
-around each multiple of the mesh by their distance m from it: exp(-2 pi i m phi).
+angle phi, the amplitude is a = Re sum conj(U) D / v over sum |U|^2 / v, both taken square to what a turn of
+the record as a whole would do, since the place of its mark is unknown; then the record is laid over the model
+and a U. The drop is what the weighted squares lose by it. Turning a wheel against its mates by whole teeth,
+or a run-out by any angle, turns lines around each multiple of the mesh by their distance m from it:
+exp(-2 pi i m phi).
 """
 
 from __future__ import annotations
@@ -28,6 +30,8 @@ from gearsim_twin.view import View
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
 
+Array = NDArray[np.float64]
+
 __all__ = ["Match", "matches", "simulated_with"]
 
 _TURNS = 4.2  # of a short simulation
@@ -41,6 +45,8 @@ _LEAST_OF_PLANETS = 0.01
 _SHAPE = 0.25  # shapes of answers are right to about that part of what deviates
 _ANGLES = 72
 _AGAIN = 3
+_LAID = 2  # times that a record is laid over the model and what was found so far
+_LEAST_SQUARE = 0.01
 _MOST_KEPT = 48
 _KEPT: WeakKeyDictionary[View, OrderedDict[tuple[str, float, float], Complex | None]] = WeakKeyDictionary()
 
@@ -85,6 +91,7 @@ def matches(
     power: float = 1.0,
     signed: bool = False,
     top: int | None = None,
+    twins: bool = True,
 ) -> list[Match]:
     """Parts that may have an effect, the best first; empty where nothing speaks for any.
 
@@ -92,7 +99,6 @@ def matches(
     ----------
     context : Context
     parts : sequence of Part
-        Twins are looked at once.
     build : callable
         (content, part, value) -> the content with the effect of that size, at angle zero or tooth 1.
     unit : float
@@ -107,11 +113,15 @@ def matches(
         Whether the opposite effect exists.
     top : int, optional
         Lines of the turn of which at least two must deviate clearly; all by default.
+    twins : bool
+        Whether the effect is the same on a wheel and on its mate of as many teeth; then one is looked at.
+        What wears or breaks from the root outwards is not: the one begins to bear where the other ends.
     """
     effect = _Effect(build, bounds, angle, power, signed, top)
     found = []
     for record in _records(context):
-        first = [_match(context, record, part, effect, unit) for part in _once(parts)]
+        once = _once(parts) if twins else parts
+        first = [_match(context, record, part, effect, unit) for part in once]
         found += [match for match in first if match is not None and match.drop >= _LEAST_DROP / 2]
     found.sort(key=lambda match: -match.drop)
     if power != 1.0:  # the shape of the answer changes with the size
@@ -183,37 +193,72 @@ def _least(context: Context, effect: _Effect, own: Deviation) -> int:
 def _by_angle(
     own: Deviation, answer: Complex, part: Part, per_turn: float, angle: str, signed: bool
 ) -> Match | None:
+    """The answer at its best angle and size, the record laid anew over the model with it."""
+    laid = own
+    for _ in range(_LAID):
+        found = _at_best_angle(laid, answer, part, per_turn, angle, signed)
+        if found is None:
+            return None
+        amplitude, at, turned = found
+        laid = own.beside(turned)
+    left = _square(laid, laid.values - turned)
+    total = _square(own, own.values)
+    drop, share = total - left, max(1.0 - left / max(total, 1e-300), _share(own, laid, turned))
+    return Match(part, abs(amplitude), at, drop, share, math.copysign(1.0, amplitude)) if drop > 0 else None
+
+
+def _square(own: Deviation, values: Complex) -> float:
+    """Weighted squares of some values."""
     weight = np.where(np.isfinite(own.variance), 1.0 / own.variance, 0.0)
-    norm = float(np.sum(np.abs(answer) ** 2 * weight))
+    return float(np.sum(np.abs(values) ** 2 * weight))
+
+
+def _at_best_angle(
+    own: Deviation, answer: Complex, part: Part, per_turn: float, angle: str, signed: bool
+) -> tuple[float, float, Complex] | None:
+    """Size, angle in turns of the part, and the answer of that size at that angle.
+
+    What a small turn of the record would do as well counts neither for nor against an answer: both are taken
+    square to it.
+    """
+    weight = np.where(np.isfinite(own.variance), 1.0 / own.variance, 0.0)
+    norm, tangent = _square(own, answer), own.turning
     if norm <= 0:
         return None
-    product = np.sum(np.conj(answer) * own.values * weight, axis=0)
     angles, steps = _angles(part, per_turn, angle)
-    mesh = max(1, round(part.teeth * per_turn)) if part.teeth > 1 else product.size * 2
-    k = np.arange(product.size)
+    mesh = max(1, round(part.teeth * per_turn)) if part.teeth > 1 else answer.shape[1] * 2
+    k = np.arange(answer.shape[1])
     residue = (k + mesh // 2) % mesh - mesh // 2 if part.teeth > 1 else k
     first = int(residue.min())
-    folded = np.bincount(residue - first, product.real) + 1j * np.bincount(residue - first, product.imag)
-    m = np.arange(first, first + folded.size)
-    corr = np.real(np.exp(2j * np.pi * np.outer(angles, m)) @ folded)
-    at = int(np.argmax(np.abs(corr) if signed else corr))
-    if corr[at] == 0 or (corr[at] < 0 and not signed):
+
+    def over(values: Complex) -> Array:
+        """Product of the turned answer with some values, at each angle."""
+        product = np.sum(np.conj(answer) * values * weight, axis=0)
+        folded = np.bincount(residue - first, product.real) + 1j * np.bincount(residue - first, product.imag)
+        m = np.arange(first, first + folded.size)
+        return np.asarray(np.real(np.exp(2j * np.pi * np.outer(angles, m)) @ folded))
+
+    stiff = max(_square(own, tangent), 1e-300)
+    astray = over(tangent)
+    swing = float(np.sum(np.real(np.conj(tangent) * own.values) * weight))
+    corr, square = over(own.values) - astray * swing / stiff, norm - astray**2 / stiff
+    # An answer that is hardly more than a turn tells nothing.
+    score = np.where(square > _LEAST_SQUARE * norm, corr / np.sqrt(np.maximum(square, 1e-300)), 0.0)
+    at = int(np.argmax(np.abs(score) if signed else score))
+    if score[at] == 0 or (score[at] < 0 and not signed):
         return None
-    amplitude, drop = float(corr[at]) / norm, float(corr[at]) ** 2 / norm
-    turned = amplitude * answer * np.exp(-2j * np.pi * residue * angles[at])
-    plain = drop / max(float(np.sum(np.abs(own.values) ** 2 * weight)), 1e-300)
-    share = max(plain, _share(own, turned))
-    return Match(part, abs(amplitude), float(steps[at]), drop, share, math.copysign(1.0, amplitude))
+    amplitude = float(corr[at] / square[at])
+    return amplitude, float(steps[at]), amplitude * answer * np.exp(-2j * np.pi * residue * angles[at])
 
 
-def _share(own: Deviation, answer: Complex) -> float:
+def _share(own: Deviation, laid: Deviation, answer: Complex) -> float:
     """What an answer takes of the lines that deviate, none counting for more than shapes are right to."""
     clear = (own.excess > _STANDS_OUT) | (np.abs(answer) ** 2 > _STANDS_OUT * own.variance)
     if not np.any(clear):
         clear = np.isfinite(own.variance)
     weight = clear / (own.variance + (_SHAPE * np.abs(own.values)) ** 2)
     total = float(np.sum(np.abs(own.values) ** 2 * weight))
-    left = float(np.sum(np.abs(own.values - answer) ** 2 * weight))
+    left = float(np.sum(np.abs(laid.values - answer) ** 2 * weight))
     return 1.0 - left / max(total, 1e-300)
 
 

@@ -49,7 +49,7 @@ class ToothCrack:
         deepest = min(most_of(context.contents[0], _KIND, part.name) for part in parts)
         unit = 0.5 * deepest
         bounds = (_BOUNDS[0], deepest)
-        found = matches(context, parts, self._build, unit, bounds, angle="tooth", power=_GROWS)
+        found = matches(context, parts, self._build, unit, bounds, angle="tooth", power=_GROWS, twins=False)
         return tooth_starts(context, found, parts, _SIZE, unit, _MOST)
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

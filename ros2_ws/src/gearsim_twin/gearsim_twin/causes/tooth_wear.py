@@ -42,7 +42,7 @@ class ToothWear:
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The wheels whose wear answers most of what the lines of the mesh deviate by."""
         parts = parts_of(context.contents[0], "gear_wear")
-        found = matches(context, parts, self._build, _UNIT_M, _BOUNDS)
+        found = matches(context, parts, self._build, _UNIT_M, _BOUNDS, twins=False)
         return [{"component": match.part.name, "depth_m": match.value} for match in found[:_MOST]]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

@@ -8,7 +8,7 @@ model scatter by, and of what a model is wrong by anyway.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -38,7 +38,10 @@ _FLOOR_LINES = 15
 # with every seed, so that such a line may have any phase.
 _MODEL, _DRAWN = 0.2, 1.0
 _SMOOTH_LINES = 9
-_ALIGNED = ("tacho", "encoder")
+# Between planets, whose errors are drawn anew, nothing but marks tells where a carrier stands.
+_MARKED = ("tacho", "encoder")
+_FINE = 8  # angles per line at which two records are laid over each other
+_NEARLY = 0.97
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +74,8 @@ class Deviation:
         Square of the measured line less that of the simulated one.
     variance : ndarray, same shape
         Of the values where nothing but noise and drawn errors makes them.
+    model : ndarray of complex128, same shape, optional
+        The simulated lines, over which the record was laid; None where its angle is known.
     """
 
     record: int
@@ -78,6 +83,21 @@ class Deviation:
     values: Complex
     power: Array
     variance: Array
+    model: Complex | None = None
+
+    def beside(self, answer: Complex) -> Deviation:
+        """The same, the record laid over the model with an answer added (same shape)."""
+        if self.model is None:
+            return self
+        own = self.values + self.model
+        return replace(self, values=own * _best_turn(own, self.model + answer) - self.model)
+
+    @property
+    def turning(self) -> Complex:
+        """What a small turn of the record does to the values, per radian; zeros where its angle is known."""
+        if self.model is None:
+            return np.zeros_like(self.values)
+        return np.asarray(1j * np.arange(self.model.shape[1]) * self.model)
 
     @property
     def excess(self) -> Array:
@@ -154,16 +174,20 @@ def _deviation(context: Context, record: int, turns: float) -> Deviation | None:
     own = measured.values
     if not context.case.levels_known:
         own = own * (_rms(simulated.values) / np.maximum(_rms(own), 1e-300))
-    if view.source not in _ALIGNED:
+    drawn = has_planets(context.contents[record])
+    if not drawn or view.source not in _MARKED:
         own = own * _best_turn(own, simulated.values)
     square = np.abs(simulated.values) ** 2
     floor = np.stack([median_filter(row, _FLOOR_LINES, mode="nearest") for row in square]) / math.log(2.0)
-    share = _DRAWN if has_planets(context.contents[record]) else _MODEL
+    share = _DRAWN if drawn else _MODEL
     variance = measured.variance + simulated.variance + 2.0 * floor + share**2 * square
     # A simulated record has next to no noise: rounding keeps lines apart by no more than this.
     variance += 1e-10 * np.max(square, axis=1, keepdims=True) + 1e-30
-    values = np.where(np.isfinite(variance), own - simulated.values, 0.0)
-    return Deviation(record, turns, values, np.abs(own) ** 2 - square, variance)
+    # A channel that is missing has infinite variance and zeros on both sides.
+    values = own - simulated.values
+    return Deviation(
+        record, turns, values, np.abs(own) ** 2 - square, variance, None if drawn else simulated.values
+    )
 
 
 def _rms(values: Complex) -> Array:
@@ -171,9 +195,20 @@ def _rms(values: Complex) -> Array:
 
 
 def _best_turn(own: Complex, model: Complex) -> Complex:
-    """Turn of each line by the angle at which both records are most alike: without a mark it is not known."""
+    """Turn of each line by the angle at which both records are most alike.
+
+    Where a tacho's mark stands against the teeth no description tells, so an angle counted by marks is as
+    unknown as one found in the vibration. Of the angles that do nearly as well, one tooth from the next, it
+    is that nearest to the marks: they may have been set to the teeth.
+    """
     lines = own.shape[1]
     weight = np.maximum(np.sum(np.abs(own) ** 2) * np.sum(np.abs(model) ** 2), 1e-300) ** 0.5
-    alike = sfft.irfft(np.sum(np.conj(own) * model, axis=0) / weight, 8 * lines)
-    at = int(np.argmax(alike)) / (8 * lines)
-    return np.asarray(np.exp(-2j * np.pi * np.arange(lines) * at))
+    steps = _FINE * lines
+    alike = sfft.irfft(np.sum(np.conj(own) * model, axis=0) / weight, steps)
+    before, after = np.roll(alike, 1), np.roll(alike, -1)
+    peaks = np.flatnonzero((alike >= before) & (alike >= after) & (alike >= _NEARLY * alike.max()))
+    at = int(peaks[np.argmin(np.minimum(peaks, steps - peaks))])
+    # A grid alone would turn the highest lines by up to pi / 8 too far: the peak of a parabola lies between.
+    bend = float(before[at] - 2.0 * alike[at] + after[at])
+    beside = 0.5 * float(before[at] - after[at]) / bend if bend < 0.0 else 0.0
+    return np.asarray(np.exp(-2j * np.pi * np.arange(lines) * (at + beside) / steps))
