@@ -114,7 +114,9 @@ def test_where_the_mark_of_a_tacho_stands_against_the_teeth_does_not_matter():
     for mark_turns in (0.0, 0.33):
         plain = deviation(gear_context("lpm34", seed=3, mark_turns=mark_turns), 0, 1.0)
         assert plain is not None
-        assert np.mean(plain.excess[:2] > 10.0) < 0.03
+        assert plain.model is not None
+        # A mesh 3 % stiffer and other errors of the teeth; marks taken for the teeth leave 3.8.
+        assert np.sum(np.abs(plain.values) ** 2) < 0.05 * np.sum(np.abs(plain.model) ** 2)
         guess = first("tooth_wear", gear_context("lpm34", worn, mark_turns=mark_turns))
         assert guess["depth_m"] == pytest.approx(1e-5, rel=0.25)
 
