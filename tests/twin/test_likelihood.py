@@ -34,6 +34,8 @@ def levels(stack, level_db, std=0.0):
         np.broadcast_to(level_db, stack.size).astype(float),
         np.full(stack.size, std),
         np.ones(stack.size, bool),
+        np.ones(stack.size),
+        np.zeros(stack.size),
     )
 
 
@@ -140,12 +142,13 @@ def test_a_model_that_errs_by_many_decibels_everywhere_is_measured_by_these():
         level = error_db * rng.standard_normal(200)
         stack = rows(std=0.3, level=level)
         yard = yard_of(stack, tau=0.7)
-        residual, variance = yard.residual(levels(stack, 0.0)), yard.variance(levels(stack, 0.0))
-        noise = yard.noise(residual, variance)
+        predicted = levels(stack, 0.0)
+        residual = yard.residual(predicted)
+        noise = yard.noise(residual, predicted)
         # The core of a t distribution with 5 degrees is narrower than its spread, by up to sqrt(3 / 5).
         assert 0.7 * error_db < np.hypot(noise.tau_db[0], 0.3) < 1.1 * error_db
         better, worse = (np.where(np.arange(200) == 3, x, residual) for x in (0.0, 10.0))
-        gain = yard.loglike(better, variance, noise) - yard.loglike(worse, variance, noise)
+        gain = yard.loglike(better, predicted, noise) - yard.loglike(worse, predicted, noise)
         more.append(float(gain.sum()))
     assert more[0] < 2.0
     assert more[1] > 4.0

@@ -194,6 +194,8 @@ def places_features(places, level_db, std_db):
         level_db=level_db,
         std_db=np.full(len(places), std_db),
         stands_out=np.ones(len(places), dtype=bool),
+        own=np.ones(len(places)),
+        repeat_db=np.zeros(len(places)),
     )
 
 

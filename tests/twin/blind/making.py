@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ _DRIVE = 5e-5  # rms of what a good drive lets its speed wander within a record
 _LIGHT = 0.06  # of the nominal load, at which teeth with play rattle
 _MISUSE = {"backlash_contact_loss"}
 _LEARNT = 2  # records of a case that are not held out
+_HEALTHY = 100  # number of the first record without effects: noise and course of its own
 # The last motion: to look at many effects of the measuring chain, a machine need run only once.
 _motions: dict[str, Array] = {}
 
@@ -61,14 +62,35 @@ class _Streams:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """Records of a case: two to train on and one held out, and the truth."""
+    """Records of a case: two to train on and one held out, the truth, and records without the effects."""
 
     records: tuple[Record, ...]
     truth: dict[str, Any]
+    healthy: tuple[Record, ...] = ()
 
 
-def make(case: Hidden, seed: tuple[int, ...], records: int = 3, seconds: float | None = None) -> Made:
-    """All records of one machine with its effects.
+@dataclass(frozen=True, eq=False)
+class _Machine:
+    """One machine on its rig: how it was made, under what load it runs, and the gains of its sensors."""
+
+    build: Build
+    plant: Plant
+    extras_of: Any
+    load: float
+    light: bool
+    gains: Array
+
+    def run(self, number: int, seed: tuple[int, ...], seconds: float) -> Record:
+        """One of its records."""
+        streams = _Streams(*(np.random.default_rng([*seed, 1 + number, k]) for k in range(3)))
+        extras = self.extras_of(streams.effects)
+        return _record(self.build, self.plant, extras, self.load, self.light, self.gains, streams, seconds)
+
+
+def make(
+    case: Hidden, seed: tuple[int, ...], records: int = 3, seconds: float | None = None, healthy: int = 0
+) -> Made:
+    """All records of one machine with its effects, and some of it without them.
 
     Parameters
     ----------
@@ -78,21 +100,16 @@ def make(case: Hidden, seed: tuple[int, ...], records: int = 3, seconds: float |
     records : int
     seconds : float, optional
         In place of the rig's.
+    healthy : int
+        Records of the same machine and sensors in other runs, before it had the effects.
     """
     rig = RIGS[case.rig]
-    rng = np.random.default_rng([*seed, 0])
-    made_by = int(rng.integers(1, 1 << 31))
-    gains = np.exp(0.01 * rng.standard_normal(len(rig.channels)))
-    load = rig.load_nm * math.exp(0.01 * rng.standard_normal())
-    build = build_of(case, rng)
-    plant, extras_of = place_in(build, made_by)
-    light = any(name in _MISUSE for name, _ in case.effects)
-    load *= _LIGHT if light else 1.0
-    made = []
-    for number in range(records):
-        streams = _Streams(*(np.random.default_rng([*seed, 1 + number, k]) for k in range(3)))
-        extras = extras_of(streams.effects)
-        made.append(_record(build, plant, extras, load, light, gains, streams, seconds or rig.seconds))
+    long = seconds or rig.seconds
+    machine = _machine(case, seed)
+    made = [machine.run(number, seed, long) for number in range(records)]
+    before = _machine(replace(case, effects=()), seed) if healthy else machine
+    sound = [before.run(_HEALTHY + number, seed, long) for number in range(healthy)]
+    build = machine.build
     ran_hz = float(np.mean([build.ran_hz[k] for k in range(min(_LEARNT, records))]))
     for truth in build.truths:
         stated = truth.pop("stated_hz", None)
@@ -109,7 +126,20 @@ def make(case: Hidden, seed: tuple[int, ...], records: int = 3, seconds: float |
         "parameters": dict(build.parameters.items()),
         "speed_hz": build.speed_hz,
     }
-    return Made(tuple(made), truth)
+    return Made(tuple(made), truth, tuple(sound))
+
+
+def _machine(case: Hidden, seed: tuple[int, ...]) -> _Machine:
+    """The machine of a seed: the same with any effects, but for these."""
+    rig = RIGS[case.rig]
+    rng = np.random.default_rng([*seed, 0])
+    made_by = int(rng.integers(1, 1 << 31))
+    gains = np.exp(0.01 * rng.standard_normal(len(rig.channels)))
+    load = rig.load_nm * math.exp(0.01 * rng.standard_normal())
+    build = build_of(case, rng)
+    plant, extras_of = place_in(build, made_by)
+    light = any(name in _MISUSE for name, _ in case.effects)
+    return _Machine(build, plant, extras_of, load * (_LIGHT if light else 1.0), light, gains)
 
 
 def build_of(case: Hidden, rng: np.random.Generator) -> Build:
@@ -127,18 +157,16 @@ def build_of(case: Hidden, rng: np.random.Generator) -> Build:
 
 
 def write(made: Made, folder: Path) -> list[Path]:
-    """Each record as a bag; names and notes tell nothing."""
+    """Each record as a bag; names and notes tell nothing. Those without effects are `before_1` and so on."""
     machine = load_machine(RIGS[made.truth["rig"]].machine)
-    places = []
-    for number, record in enumerate(made.records):
-        place = folder / f"run_{number + 1}"
-        with BagWriter(place, {}, sync_period_s=None) as writer:
-            stream = StreamWriter(writer)
-            stream.write(machine, record.t0_ns)
-            for batch in record.batches():
-                stream.write(batch)
-        places.append(place)
-    return places
+    for name, records in (("run", made.records), ("before", made.healthy)):
+        for number, record in enumerate(records):
+            with BagWriter(folder / f"{name}_{number + 1}", {}, sync_period_s=None) as writer:
+                stream = StreamWriter(writer)
+                stream.write(machine, record.t0_ns)
+                for batch in record.batches():
+                    stream.write(batch)
+    return [folder / f"run_{number + 1}" for number in range(len(made.records))]
 
 
 def _perturbed(rig: Rig, rng: np.random.Generator) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """What is known before the measured records are looked at: of the machine's numbers, and of a model's errors.
 
 Records of the healthy machine replace the plain assumptions by what they teach: the knobs start where they
-want them, known as well as they tell, and the spread of the model's own errors is the one found there.
+want them, known as well as they tell, the spread of the model's own errors is the one found there, and places
+that were there before are known from the records themselves (`taught`).
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ import numpy as np
 
 from gearsim_twin.causes.prior import LogNormal
 from gearsim_twin.fit import fit_tuning, judged
-from gearsim_twin.likelihood import TAU_FACTOR, Yardstick
+from gearsim_twin.likelihood import REPEAT_FACTOR, TAU_FACTOR, Yardstick
 from gearsim_twin.model import Model
 from gearsim_twin.stack import ASSUMED, TONES
 from gearsim_twin.systematic import smooth_errors
+from gearsim_twin.taught import Conditions, Taught
 from gearsim_twin.tuning import Setting, Tuning
 from gearsim_twin.workbench import Workbench
 
-__all__ = ["Prior", "calibrated", "plain_prior"]
+__all__ = ["Prior", "calibrated", "plain_prior", "settled_on", "taught_by"]
 
 SMOOTH_DB = 1.0
 """Spread of smooth errors of a tuned model; single places scatter beyond."""
@@ -69,10 +71,20 @@ class Prior:
         use = stack.part((*bench.training, -1)) & stack.told
         median = np.array([self._tau(name) for name in stack.domains])
         learnt = [name in self.tau_db for name in stack.domains]
+        if bench.taught is not None:
+            # What a cause adds the healthy machine has not shown: it is known no better than models are.
+            plain = [1.0 if name == ASSUMED else TAU_DB[name] for name in stack.domains]
+            median, learnt = np.maximum(median, plain), [False] * len(plain)
         factor = np.where(learnt, _LEARNT_TAU_FACTOR, TAU_FACTOR)
+        several = bench.taught is not None and bench.taught.several
+        repeat = np.full(len(stack.domains), _LEARNT_TAU_FACTOR if several else REPEAT_FACTOR)
         share = np.array([1.0 if name in (ASSUMED, TONES) else _FIRST_SHARE for name in stack.domains])
         spread = np.full(len(stack.domains), SMOOTH_DB)
-        return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread))
+        return Yardstick(stack, share, median, factor, use, smooth_errors(stack, use, spread), repeat)
+
+    def tau_of_places(self, domain: str) -> float:
+        """What a good model misses of a place, smooth errors and scatter together."""
+        return float(np.hypot(SMOOTH_DB, self._tau(domain)))
 
     def _tau(self, domain: str) -> float:
         return 1.0 if domain == ASSUMED else self.tau_db.get(domain, TAU_DB[domain])
@@ -97,6 +109,68 @@ def calibrated(bench: Workbench, prior: Prior) -> Prior:
     )
     tau = zip(bench.stack.domains, fitted.posterior.noise.tau_db, strict=True)
     return Prior(Tuning(settings), {name: float(value) for name, value in tau if name != ASSUMED})
+
+
+def taught_by(bench: Workbench, prior: Prior, conditions: Sequence[Conditions]) -> Taught | None:
+    """What records of the healthy machine show at each place, beside the calibrated model.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Of the healthy records.
+    prior : Prior
+        As they calibrated it.
+    conditions : sequence of Conditions
+        Of each of them.
+
+    Returns
+    -------
+    Taught or None
+        None where the calibrated model is none that the simulator takes.
+    """
+    model = Model(prior.tuning, prior.tuning.nominal)
+    (trial,) = bench.trials([model])
+    plain = bench.simulated(model, bench.training)
+    if trial.refused:
+        return None
+    shown = tuple(bench.nuisances.apply(trial.nuisance, each) for each in plain if each is not None)
+    measured = tuple(bench.measured[k] for k in bench.training)
+    tau_db = {name: prior.tau_of_places(name) for name in bench.stack.domains}
+    return Taught(measured, shown, tuple(conditions), tau_db, trial.nuisance)
+
+
+# That records given as those of the machine are none of it, or that it was changed: once in thousands.
+_SAME_MACHINE_NATS = 8.0
+_OTHER = (
+    "the healthy records predict the others no better than the model alone does: of another machine, or one "
+    "that was changed; they teach the machine's numbers only"
+)
+_ELSEWHERE = (
+    "no healthy record is of much the same speed and load: they teach the machine's numbers, not its places"
+)
+
+
+def settled_on(bench: Workbench, prior: Prior) -> tuple[Workbench, tuple[str, ...]]:
+    """The bench with what healthy records teach of places, or without where that is none of this machine.
+
+    Returns
+    -------
+    Workbench
+    tuple of str
+        What is to be told of it.
+    """
+    if bench.taught is None:
+        return bench, ()
+    if not any(bench.familiar(k) for k in bench.training):
+        return bench.by_models_alone(), (_ELSEWHERE,)
+    model = Model(prior.tuning, prior.tuning.nominal)
+    alone = bench.by_models_alone()
+    values = []
+    for each in (bench, alone):
+        (trial,) = each.trials([model])
+        # Before independence is looked at: both are to be weighed alike.
+        values.append(judged(prior.yard(each), trial, np.zeros((each.stack.size, len(model.knobs)))).evidence)
+    return (alone, (_OTHER,)) if values[1] > values[0] + _SAME_MACHINE_NATS else (bench, ())
 
 
 def _known(setting: Setting, coordinate: float, std: float) -> Setting:

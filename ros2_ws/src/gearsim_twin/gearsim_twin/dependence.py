@@ -3,7 +3,8 @@
 A model that is a little wrong is wrong in the same direction at neighbouring places, in neighbouring
 channels and in every record. Counted as independent, such differences would prove anything. The share of
 a domain is the number of independent differences over the number of places; log likelihoods are multiplied
-by it (a power likelihood with the design effect of cluster sampling as its temperature).
+by it (a power likelihood with the design effect of cluster sampling as its temperature). How far what chance
+draws anew for each machine is independent is told by simulated machines of the kind (`realisations`).
 """
 
 from __future__ import annotations
@@ -43,11 +44,17 @@ def independent_share(stack: Stack, z: Array, systematic: Array) -> Array:
     -----
     The variance of a mean over a cluster of m equally correlated values is 1 + (m - 1) r times that of
     independent ones (Kish, Survey Sampling, 1965, 8.2); along a run the sum over the autocorrelation takes
-    its place. The three kinds of neighbourhood are taken as separable, so for the systematic part their
-    factors multiply.
+    its place. The kinds of neighbourhood (along a run, channels, carrier bands, records) are taken as
+    separable, so for the systematic part their factors multiply. The rest of the variance is sampling's, which
+    is independent, and chance's, with the design effect that machines of the kind show.
     """
     held = np.clip(z, -_MOST_Z, _MOST_Z)
     shares = np.ones(len(stack.domains))
+    groups = (
+        _pairs(stack.line, stack.band, stack.record),
+        _pairs(stack.line, stack.channel, stack.record),
+        _pairs(stack.line, stack.channel, stack.band),
+    )
     for number, name in enumerate(stack.domains):
         mine = (stack.domain == number) & (z != 0.0)
         count = int(mine.sum())
@@ -55,18 +62,27 @@ def independent_share(stack: Stack, z: Array, systematic: Array) -> Array:
             continue
         part = float(np.clip(systematic[number], 0.05, 1.0))
         power = max(float(np.mean(held[mine] ** 2)), 1e-12) * part
-        along = _along(stack, mine, held, power)
-        channels = _among(_pairs(stack.line, stack.record), mine, held, power)
-        records = _among(_pairs(stack.line, stack.channel), mine, held, power)
-        effect = (1.0 - part) + part * along * channels * records
+        alike = _along(stack, mine, held, power)
+        for group in groups:
+            alike *= _among(group, mine, held, power)
+        drawn = (1.0 - part) * _drawn(stack, mine)
+        effect = (1.0 - part - drawn) + drawn * float(stack.chance_effect[number]) + part * alike
         shares[number] = max(min(1.0, _LEAST_DIFFERENCES / count), 1.0 / effect)
     return shares
 
 
-def _pairs(line: Codes, other: Codes) -> Codes:
-    """Groups of places that agree in `line` and in `other`."""
-    base = int(other.max(initial=0)) + 2
-    return np.asarray(np.unique(line * base + other, return_inverse=True)[1])
+def _drawn(stack: Stack, mine: np.ndarray) -> float:
+    """Part of what is not the model's that chance draws for each machine; sampling has both sides."""
+    chance2 = stack.chance_db[mine] ** 2
+    return float(np.mean(chance2 / np.maximum(chance2 + 2.0 * stack.measured.std_db[mine] ** 2, 1e-12)))
+
+
+def _pairs(*codes: Codes) -> Codes:
+    """Groups of places that agree in all of some codes."""
+    found = codes[0]
+    for other in codes[1:]:
+        found = np.unique(found * (int(other.max(initial=0)) + 2) + other, return_inverse=True)[1]
+    return np.asarray(found)
 
 
 def _correlation(products: float, pairs: float, power: float) -> float:

@@ -85,7 +85,7 @@ def heldout_gain(
         total, rms = [], []
         for levels, noise in both:
             residual = yard.residual(levels) + error
-            total.append(float(yard.loglike(residual, yard.variance(levels), noise).sum()))
+            total.append(float(yard.loglike(residual, levels, noise).sum()))
             rms.append(float(np.sqrt(np.sum(weight * residual[mine] ** 2))))
         nats.append(total[1] - total[0])
         falls.append(rms[0] - rms[1])
@@ -101,7 +101,7 @@ def _interval(values: list[float]) -> tuple[float, float]:
 
 def _errors(yard: Yardstick, levels: Levels, noise: Noise, rng: np.random.Generator) -> Array:
     stack = yard.stack
-    spread = np.sqrt(yard.variance(levels) + noise.tau_db[stack.domain] ** 2)
+    spread = np.sqrt(yard.variance(levels) + yard.missed(levels, noise))
     block = stack.line // _BLOCK
     common = rng.standard_normal(int(block.max()) + 1)[block]
     own = rng.standard_normal(stack.size)

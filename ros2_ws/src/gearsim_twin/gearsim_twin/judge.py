@@ -11,16 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from gearsim_twin.baseline import scenario_content
-from gearsim_twin.calibrate import Prior, calibrated, plain_prior
+from gearsim_twin.calibrate import Prior, calibrated, plain_prior, settled_on, taught_by
 from gearsim_twin.case import LEAST_PERIODS, Case, least_seconds
 from gearsim_twin.causes import CAUSES
 from gearsim_twin.causes.bearing_signs import signs_of
 from gearsim_twin.causes.cause import Cause, Content
 from gearsim_twin.causes.context import Context
 from gearsim_twin.channels import telling_channels
+from gearsim_twin.compare.chains import Nuisance, behind
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan, features, make_plan
 from gearsim_twin.compare.merged import discrepancies
@@ -37,6 +38,7 @@ from gearsim_twin.score import score_models
 from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
 from gearsim_twin.simulated import Simulator
+from gearsim_twin.taught import Taught
 from gearsim_twin.tuning import Tuning, tuning_of
 from gearsim_twin.verdict import Verdict
 from gearsim_twin.view import View
@@ -101,7 +103,9 @@ class Bench:
         """Length of all simulations."""
         return _seconds(self.case, self.settings)
 
-    def workbench(self, records: Sequence[int], training: int, plan: Plan) -> Workbench:
+    def workbench(
+        self, records: Sequence[int], training: int, plan: Plan, taught: Taught | None = None
+    ) -> Workbench:
         """Some records of the case, the first so many of them for training."""
         numbers = tuple(records)
         then = partial(features, plan=plan)
@@ -118,7 +122,22 @@ class Bench:
             nuisances=measuring_chain(plan, self.case.levels_known),
             chance=self.chance(numbers, training, plan),
             numbers=numbers,
+            taught=taught,
+            conditions=tuple((self.views[k].speed_hz, *_conditions(self.nominal[k])) for k in numbers),
         )
+
+    @property
+    def healthy(self) -> range:
+        """Records of the healthy machine that are looked at."""
+        first = len(self.case.training) + len(self.case.holdout)
+        return range(first, first + len(self.case.healthy))[: self.settings.most_records]
+
+    def taught(self, prior: Prior, plan: Plan) -> Taught | None:
+        """What they show at the places of a plan; None where there are none."""
+        if not self.healthy:
+            return None
+        bench = self.workbench(self.healthy, len(self.healthy), plan)
+        return taught_by(bench, prior, bench.conditions)
 
     def chance(self, numbers: Sequence[int], training: int, plan: Plan) -> dict[int, Realisations]:
         """What chance does to each record: learnt once under each condition, on records for training."""
@@ -159,6 +178,13 @@ class Bench:
         (shown,) = bench.trials([trial.model], bench.holdout)
         return self.context(bench, prior, shown, bench.holdout)
 
+    @staticmethod
+    def chain(bench: Workbench, trial: Trial) -> Nuisance:
+        """The whole measuring chain behind a trial's simulations."""
+        if bench.taught is None:
+            return cast(Nuisance, trial.nuisance[0])
+        return behind(bench.taught.chain[0], trial.nuisance[0])
+
     def context(
         self, bench: Workbench, prior: Prior, trial: Trial, records: Sequence[int] | None = None
     ) -> Context:
@@ -170,6 +196,7 @@ class Bench:
         # Of records for training that the search does not look at positions of lines are read all the same.
         training = range(len(self.case.training)) if records == bench.training else ()
         more = [k for k in training if k not in contents]
+        chain = self.chain(bench, trial)
         plain = tuple(
             _simulated(self.simulator, k, content, self.settings) for k, content in contents.items()
         )
@@ -183,10 +210,8 @@ class Bench:
             simulated_views=plain,
             more_views=tuple(self.views[k] for k in more),
             more_contents=tuple(trial.model.content(self.nominal[k]) for k in more),
-            noisy_views=tuple(
-                heard(view, trial.nuisance[0], self.settings.seed + k) for k, view in enumerate(plain)
-            ),
-            gains_db=trial.nuisance[0].gains_db,
+            noisy_views=tuple(heard(view, chain, self.settings.seed + k) for k, view in enumerate(plain)),
+            gains_db=chain.gains_db,
         )
 
 
@@ -237,7 +262,8 @@ def _judged(
     prior = _prior(bench, tuning, tell)
     held_out = range(train, train + held)
     told = bench.told()
-    work = bench.workbench((*told, *held_out), len(told), bench.search)
+    work = bench.workbench((*told, *held_out), len(told), bench.search, bench.taught(prior, bench.search))
+    work, of_healthy = settled_on(work, prior)
     yard = prior.yard(work)
     tell("tuning the model")
     tuned = fit_tuning(work, yard, Model(prior.tuning, prior.tuning.nominal))
@@ -251,17 +277,20 @@ def _judged(
     selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left, again)
     tell("scoring on held-out records")
     whole = work if bench.search is bench.plan and len(told) == train else None
-    whole = whole or bench.workbench(range(train + held), train, bench.plan)
-    nominal = Model(tuning, tuning.nominal)
-    models = [nominal, selection.tuned.trial.model, selection.final.trial.model]
-    trials = whole.trials(models, (*whole.training, *whole.holdout))
+    if whole is None:
+        taught = bench.taught(prior, bench.plan) if work.taught is not None else None
+        whole = bench.workbench(range(train + held), train, bench.plan, taught)
+    records = (*whole.training, *whole.holdout)
+    trials = whole.by_models_alone().trials([Model(tuning, tuning.nominal)], records)
+    trials += whole.trials([selection.tuned.trial.model, selection.final.trial.model], records)
     names = ("baseline", "tuned_only", "extended")
     scores = score_models(
         [whole.measured[k] for k in whole.holdout],
         {name: [trial.features[k] for k in whole.holdout] for name, trial in zip(names, trials, strict=True)},
         settings.seed,
     )
-    remarks = dict.fromkeys([*case.remarks, *(each for view in bench.views for each in view.remarks)])
+    told_by = [*case.remarks, *(each for view in bench.views for each in view.remarks), *of_healthy]
+    remarks = dict.fromkeys(told_by)
     evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label)
     verdict = concluded(evidence)
     if show:
@@ -281,13 +310,10 @@ def _nothing_left(context: Context) -> bool:
 def _prior(bench: Bench, tuning: Tuning, tell: Tell) -> Prior:
     """What is known of machine and model beforehand: assumed, or taught by records of the healthy machine."""
     prior = plain_prior(tuning)
-    case = bench.case
-    first = len(case.training) + len(case.holdout)
-    if not case.healthy:
+    if not bench.healthy:
         return prior
     tell("calibrating on the healthy machine")
-    healthy = range(first, first + len(case.healthy))[: bench.settings.most_records]
-    return calibrated(bench.workbench(healthy, len(healthy), bench.search), prior)
+    return calibrated(bench.workbench(bench.healthy, len(bench.healthy), bench.search), prior)
 
 
 def _conditions(content: Content) -> tuple[float, float]:

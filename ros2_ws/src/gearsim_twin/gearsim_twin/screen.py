@@ -167,7 +167,7 @@ def _values(yard: Yardstick, base: Fitted, trial: Trial) -> tuple[float, float, 
             candidates.append(replace(trial.levels, level_db=level))
     adapted = [yard.adapted(levels, base.slopes, base.at, noise) for levels in candidates]
     values = [
-        float(yard.loglike(yard.residual(levels), yard.variance(levels), noise).sum()) - 0.5 * float(at @ at)
+        float(yard.loglike(yard.residual(levels), levels, noise).sum()) - 0.5 * float(at @ at)
         for levels, at in adapted
     ]
     best = int(np.argmax(values))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,14 @@ from gearsim_twin.compare.discrepancy import RATIO_DB
 if TYPE_CHECKING:
     from gearsim_twin.compare.features import Features
     from gearsim_twin.compare.places import Place
+    from gearsim_twin.realisations import Realisations
 
 __all__ = ["ASSUMED", "TONES", "Assumed", "Levels", "Stack", "group_of", "levels_of", "stack_of"]
 
 ASSUMED = "assumed"
 """Name of the domain of assumptions."""
 TONES = "tones"
-"""Name of the tones of the domain orders: they belong to no shaft, so no model errs at them by a little."""
+"""Name of the tones and passages of the domain orders: of these few no model errs by a little all over."""
 _NO_RECORD = -1
 # Where only the measured record says something the model says that anything may be.
 SILENT_DB = 20.0
@@ -55,11 +56,15 @@ class Levels:
         With their sampling standard deviations.
     clear : ndarray of bool, shape (n,)
         Where the level is more than noise alone would give.
+    own, repeat_db : ndarray, shape (n,)
+        Share that rests on a model alone, and what the rest differs by from run to run (`familiar`).
     """
 
     level_db: Array
     std_db: Array
     clear: NDArray[np.bool_]
+    own: Array
+    repeat_db: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,9 +84,15 @@ class Stack:
     channel : ndarray of int, shape (n,)
         The same number for one channel.
     run : ndarray of int, shape (n,)
-        The same number along one representation of one channel of one record.
+        The same number along one representation of one channel and band of one record.
+    band : ndarray of int, shape (n,)
+        The same number for one carrier band.
     order : ndarray of int, shape (n,)
         Sorts places along each run.
+    chance_db : ndarray, shape (n,)
+        What machines of the kind differ by (`realisations`); 0 where that is not known.
+    chance_effect : ndarray, shape (domains,)
+        How many of those differences say as much as one that is independent.
     """
 
     places: tuple[Place | Assumed, ...]
@@ -92,7 +103,10 @@ class Stack:
     line: Codes
     channel: Codes
     run: Codes
+    band: Codes
     order: Codes
+    chance_db: Array
+    chance_effect: Array
 
     @property
     def told(self) -> NDArray[np.bool_]:
@@ -115,6 +129,7 @@ class Stack:
         """
         level, std = self.measured.level_db.copy(), np.zeros(self.size)
         clear = self.measured.clear.copy()
+        own, repeat = np.ones(self.size), np.zeros(self.size)
         for record, each in features.items():
             mine = self.record == record
             part = levels_of([each])
@@ -122,14 +137,15 @@ class Stack:
             level[mine] = np.where(silent, level[mine], part.level_db)
             std[mine] = np.where(silent, SILENT_DB, part.std_db)
             clear[mine] = part.clear
+            own[mine], repeat[mine] = part.own, part.repeat_db
         if corrections_db:
             level[self.record == _NO_RECORD] = np.asarray(corrections_db, dtype=np.float64)
-        return Levels(level, std, clear)
+        return Levels(level, std, clear, own, repeat)
 
 
 def group_of(place: Place | Assumed) -> str:
     """Name of what a place belongs to in a stack: its domain, or `TONES`."""
-    return TONES if place.domain == "orders" and place.kind == "tone" else place.domain
+    return TONES if place.domain == "orders" and place.kind in ("tone", "passage") else place.domain
 
 
 def _codes(keys: Sequence[Hashable]) -> Codes:
@@ -137,8 +153,15 @@ def _codes(keys: Sequence[Hashable]) -> Codes:
     return np.array([numbers.setdefault(key, len(numbers)) for key in keys], dtype=np.intp)
 
 
-def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> Stack:
-    """The measured features of several records, one entry per record, and what is assumed."""
+def stack_of(
+    measured: Sequence[Features],
+    assumed: Sequence[Assumed] = (),
+    chance: Mapping[int, Realisations] | None = None,
+) -> Stack:
+    """The measured features of several records, one entry per record, and what is assumed.
+
+    `chance` tells of some records what machines of the kind differ by.
+    """
     places: tuple[Place | Assumed, ...] = (
         *(place for features in measured for place in features.places),
         *assumed,
@@ -148,7 +171,12 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
     groups = [group_of(place) for place in places]
     names = tuple(dict.fromkeys(groups))
     at = np.array([place.at for place in places], dtype=np.float64)
-    run = _codes([(k, p.domain, p.channel, p.kind) for k, p in zip(record.tolist(), places, strict=True)])
+    run = _codes(
+        [
+            (k, p.domain, p.channel, p.kind, getattr(p, "band_hz", None))
+            for k, p in zip(record.tolist(), places, strict=True)
+        ]
+    )
     found = levels_of(measured)
     return Stack(
         places=places,
@@ -156,6 +184,8 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
             np.concatenate([found.level_db, np.zeros(len(assumed))]),
             np.concatenate([found.std_db, np.array([each.std_db for each in assumed], dtype=np.float64)]),
             np.concatenate([found.clear, np.ones(len(assumed), dtype=np.bool_)]),
+            np.ones(len(places)),
+            np.zeros(len(places)),
         ),
         domains=names,
         record=record,
@@ -163,8 +193,23 @@ def stack_of(measured: Sequence[Features], assumed: Sequence[Assumed] = ()) -> S
         line=_codes([(place.domain, place.kind, place.at) for place in places]),
         channel=_codes([place.channel for place in places]),
         run=run,
+        band=_codes([getattr(place, "band_hz", None) for place in places]),
         order=np.lexsort((at, run)),
+        chance_db=np.concatenate([*_chance_db(measured, chance or {}), np.zeros(len(assumed))]),
+        chance_effect=_chance_effect(names, tuple((chance or {}).values())),
     )
+
+
+def _chance_db(measured: Sequence[Features], chance: Mapping[int, Realisations]) -> Iterator[Array]:
+    for record, features in enumerate(measured):
+        scale = np.array([_scale(place) for place in features.places], dtype=np.float64)
+        yield chance[record].std_db * scale if record in chance else 0.0 * scale
+
+
+def _chance_effect(names: Sequence[str], chance: Sequence[Realisations]) -> Array:
+    """By the domains' names; 1 where nothing is known."""
+    found = [[each.effect.get(name, 1.0) for each in chance] or [1.0] for name in names]
+    return np.array([float(np.mean(each)) for each in found])
 
 
 def levels_of(features: Sequence[Features]) -> Levels:
@@ -175,6 +220,8 @@ def levels_of(features: Sequence[Features]) -> Levels:
         np.concatenate([empty, *(each.level_db for each in features)]) * scale,
         np.concatenate([empty, *(each.std_db for each in features)]) * scale,
         np.concatenate([np.zeros(0, dtype=np.bool_), *(each.stands_out for each in features)]),
+        np.concatenate([empty, *(each.own for each in features)]),
+        np.concatenate([empty, *(each.repeat_db for each in features)]) * scale,
     )
 
 

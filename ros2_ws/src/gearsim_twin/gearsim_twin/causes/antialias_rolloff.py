@@ -114,6 +114,7 @@ class AntialiasRolloff:
     """A chain that ends below the band, or that lets in what lies above it."""
 
     name = "antialias_rolloff"
+    scales = True
     of_chain = True
     parameters: tuple[Parameter, ...] = (Parameter("corner_hz", "Hz", LogNormal(8000.0, 2.5, 50.0, 1e6)),)
     confused_with: tuple[tuple[str, str], ...] = (

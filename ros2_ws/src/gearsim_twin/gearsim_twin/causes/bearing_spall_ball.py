@@ -22,6 +22,7 @@ class BearingSpallBall:
     """A pit in one ball or roller."""
 
     name = "bearing_spall_ball"
+    superposes = True
     parameters: tuple[Parameter, ...] = (SPALL_WIDTH,)
     size = SPALL_WIDTH.name
     confused_with: tuple[tuple[str, str], ...] = (

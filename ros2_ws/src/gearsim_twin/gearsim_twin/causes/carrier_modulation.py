@@ -25,6 +25,7 @@ class CarrierModulation:
     """The ring off the carrier's axis: errors of order 1 of the carrier in all its meshes."""
 
     name = "carrier_modulation"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("eccentricity_m", "m", LogNormal(_UNIT_M, 3.0, *_BOUNDS)),
         Parameter("phase_rad", "rad", Uniform(-math.pi, math.pi)),

@@ -100,6 +100,7 @@ class CasingResonance:
     """A mass that swings on one measuring site."""
 
     name = "casing_resonance"
+    scales = True
     size = "mass_kg"  # goes to nothing with it
     parameters: tuple[Parameter, ...] = (
         Parameter("frequency_hz", "Hz", LogNormal(2000.0, 2.5, 20.0, 20000.0)),

@@ -26,6 +26,7 @@ class GearRunout:
     """Transmission error of order 1 of a wheel, and its mesh stiffness modulated alike."""
 
     name = "gear_runout"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("eccentricity_m", "m", LogNormal(_UNIT_M, 3.0, *_BOUNDS)),
         Parameter("phase_rad", "rad", Uniform(-math.pi, math.pi)),

@@ -24,6 +24,7 @@ class Looseness:
     """A pedestal's base that is softer while it lifts."""
 
     name = "looseness"
+    superposes = True
     parameters: tuple[Parameter, ...] = (Parameter("reduction", "1", Uniform(0.0, 0.95)),)
     confused_with: tuple[tuple[str, str], ...] = (
         (

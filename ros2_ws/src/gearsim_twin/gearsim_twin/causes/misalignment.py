@@ -31,6 +31,7 @@ class Misalignment:
     """Forces of a coupling whose shafts are not in line, or teeth that carry at one end."""
 
     name = "misalignment"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("offset_m", "m", LogNormal(_OFFSET_M, 3.0, *_OFFSETS_M)),
         Parameter("angle_rad", "rad", LogNormal(0.003, 4.0, *_ANGLES_RAD)),

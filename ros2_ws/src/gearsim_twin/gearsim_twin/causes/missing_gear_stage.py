@@ -148,6 +148,7 @@ class MissingGearStage:
     """A stage in front of those that the model has."""
 
     name = "missing_gear_stage"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("amplitude_nm", "N*m", LogNormal(0.5, 8.0, 1e-6, 1e5)),
         Parameter("second", "1", Uniform(0.0, 4.0)),

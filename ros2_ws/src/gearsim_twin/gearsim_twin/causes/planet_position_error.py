@@ -24,6 +24,7 @@ class PlanetPositionError:
     """A planet whose pin is ahead of its place on the carrier, or further out."""
 
     name = "planet_position_error"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("ahead_m", "m", Normal(0.0, 1e-5, -2e-4, 2e-4), step=5e-7),
         Parameter("outward_m", "m", Normal(0.0, 1e-5, -2e-4, 2e-4), step=5e-7),

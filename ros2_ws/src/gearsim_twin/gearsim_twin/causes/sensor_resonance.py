@@ -75,6 +75,7 @@ class SensorResonance:
     """A sensor on wax, a magnet or held by hand."""
 
     name = "sensor_resonance"
+    scales = True
     of_chain = True
     parameters: tuple[Parameter, ...] = (
         Parameter("resonance_hz", "Hz", LogNormal(8000.0, 2.5, 100.0, 1e5)),

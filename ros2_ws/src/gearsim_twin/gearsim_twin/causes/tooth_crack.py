@@ -25,6 +25,7 @@ class ToothCrack:
     """Less stiffness of a mesh while one tooth is in contact."""
 
     name = "tooth_crack"
+    superposes = True
     size = _SIZE
     parameters: tuple[Parameter, ...] = (Parameter("depth_m", "m", LogNormal(2e-3, 1.8, *_BOUNDS)),)
     confused_with: tuple[tuple[str, str], ...] = (

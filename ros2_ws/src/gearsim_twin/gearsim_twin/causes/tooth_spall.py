@@ -26,6 +26,7 @@ class ToothSpall:
     """A transmission error once a turn while the other flank rolls over a pit."""
 
     name = "tooth_spall"
+    superposes = True
     size = _SIZE
     parameters: tuple[Parameter, ...] = (Parameter("width_m", "m", LogNormal(_UNIT_M, 2.0, *_BOUNDS)),)
     confused_with: tuple[tuple[str, str], ...] = (

@@ -65,6 +65,7 @@ class TransferPath:
     """A mass between two measuring sites, or the casing that joins them."""
 
     name = "transfer_path"
+    scales = True
     parameters: tuple[Parameter, ...] = (
         Parameter("mass_kg", "kg", LogNormal(1.0, 4.0, 1e-3, 1000.0)),
         Parameter("frequency_hz", "Hz", LogNormal(800.0, 3.0, 10.0, 20000.0)),

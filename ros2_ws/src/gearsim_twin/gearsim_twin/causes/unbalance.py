@@ -26,6 +26,7 @@ class Unbalance:
     """A rotating force on the wheel's plane of a shaft."""
 
     name = "unbalance"
+    superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("unbalance_kg_m", "kg*m", LogNormal(_UNIT_KG_M, 4.0, *_BOUNDS)),
         Parameter("phase_rad", "rad", Uniform(-math.pi, math.pi)),

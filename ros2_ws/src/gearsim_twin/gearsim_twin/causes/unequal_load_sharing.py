@@ -24,6 +24,7 @@ class UnequalLoadSharing:
     """One planet carries more than its part of the load, or less."""
 
     name = "unequal_load_sharing"
+    superposes = True
     parameters: tuple[Parameter, ...] = (Parameter("excess", "1", Normal(0.0, 0.4, -0.9, 5.0), step=0.03),)
     confused_with: tuple[tuple[str, str], ...] = (
         (

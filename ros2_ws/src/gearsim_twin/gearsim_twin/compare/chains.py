@@ -23,7 +23,7 @@ the second). Of an encoder the floor alone counts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.lines import LEAST_STD_DB
 from gearsim_twin.compare.places import Place
 
-__all__ = ["ChannelNuisance", "Nuisance", "apply"]
+__all__ = ["ChannelNuisance", "Nuisance", "apply", "behind"]
 
 Vector = NDArray[np.float64]
 
@@ -92,6 +92,28 @@ class Nuisance:
         return {c.channel: c.gain_db for c in self.channels}
 
 
+def behind(first: Nuisance, second: Nuisance) -> Nuisance:
+    """Two measuring chains one after the other, as one with the knots of the first."""
+    found = []
+    for chain in first.channels:
+        more = second.of(chain.channel)
+        hz = np.array(chain.floor_hz)
+        power = more.gain(hz) * chain.floor(hz) + more.floor(hz)
+        with np.errstate(divide="ignore"):
+            floor_db = 10 * np.log10(power)
+        fourth = chain.corner_hz**-4 + more.corner_hz**-4
+        found.append(
+            replace(
+                chain,
+                gain_db=chain.gain_db + more.gain_db,
+                floor_db=tuple(floor_db.tolist()),
+                corner_hz=fourth**-0.25 if fourth > 0 else math.inf,
+            )
+        )
+    known = {chain.channel for chain in first.channels}
+    return Nuisance((*found, *(each for each in second.channels if each.channel not in known)))
+
+
 def apply(nuisance: Nuisance, simulated: Features) -> Features:
     """Simulated features as the measuring chain would show them."""
     old = simulated.levels
@@ -101,15 +123,8 @@ def apply(nuisance: Nuisance, simulated: Features) -> Features:
         power = rows & np.isfinite(old.frequency_hz) & np.isfinite(old.level_db)
         _shift_power(old, new, power, chain)
         _shift_rest(simulated, new, rows, chain)
-    levels = Levels(
-        new["level_db"],
-        np.maximum(new["std_db"], LEAST_STD_DB),
-        new["height_db"],
-        old.clear_db,
-        old.frequency_hz,
-        old.bandwidth_hz,
-        old.gauss_db,
-    )
+    std = np.maximum(new["std_db"], LEAST_STD_DB)
+    levels = replace(old, level_db=new["level_db"], std_db=std, height_db=new["height_db"])
     return Features(simulated.places, levels, simulated.speed_hz)
 
 
@@ -204,7 +219,7 @@ class _Mixture:
             width = np.array([places[k].width for k in inside])
             power = 10 ** (0.1 * levels.level_db[inside]) * width
             for k in np.flatnonzero(rows & simulated.stands_out & np.isfinite(levels.frequency_hz)).tolist():
-                if places[k].domain == "orders":
+                if places[k].domain == "orders" and places[k].kind != "passage":
                     near = np.argmin(np.abs(np.log(hz / levels.frequency_hz[k])))
                     if abs(hz[near] - levels.frequency_hz[k]) <= 0.6 * width[near]:
                         power[near] += 10 ** (0.1 * levels.level_db[k])

@@ -77,7 +77,8 @@ def compare(measured: Features, simulated: Features, tau_db: Mapping[str, float]
     measured, simulated : Features
         At the same places; `simulated` with its nuisances.
     tau_db : mapping of str to float, optional
-        Per domain, what a good model of a machine still misses (standard deviation); 1 dB by default.
+        Per domain, what a good model of a machine still misses (standard deviation); 1 dB by default. Of
+        what records of the healthy machine had already, `simulated` says itself what it is known to.
 
     Raises
     ------
@@ -96,7 +97,8 @@ def compare(measured: Features, simulated: Features, tau_db: Mapping[str, float]
         & (measured.stands_out | simulated.stands_out)
     )
     sampling = scale * np.hypot(measured.std_db, simulated.std_db)
-    std = np.where(counted, np.hypot(sampling, tau_each), np.inf)
+    missed = np.hypot(tau_each * simulated.own, scale * simulated.repeat_db)
+    std = np.where(counted, np.hypot(sampling, missed), np.inf)
     raw = np.where(counted, measured.level_db, 0.0) - np.where(counted, simulated.level_db, 0.0)
     difference = scale * raw
     z = difference / std
@@ -153,10 +155,12 @@ def pooled(comparisons: Sequence[Comparison]) -> Comparison:
     return _comparison(comparisons[0].places, difference, z, std, some, speed)
 
 
-def significant(comparison: Comparison, false_share: float = 0.01, nu: float = NU) -> NDArray[np.bool_]:
+def significant(
+    comparison: Comparison, false_share: float = 0.01, nu: float | NDArray[np.float64] = NU
+) -> NDArray[np.bool_]:
     """Places that differ for certain: of those told at most `false_share` do so by chance, on average.
 
-    `nu` are the degrees of freedom of differences in standard deviations.
+    `nu` are the degrees of freedom of differences in standard deviations, of all places or of each, (n,).
 
     Benjamini and Hochberg, J. R. Stat. Soc. B 57 (1995) 289-300, over all counted places, with the tails of
     Student's t; valid for positively dependent places, as neighbours are.
@@ -169,6 +173,7 @@ def significant(comparison: Comparison, false_share: float = 0.01, nu: float = N
     index = np.flatnonzero(comparison.counted)
     if index.size == 0:
         return out
-    p = 2 * stats.t.sf(np.abs(comparison.z[index]), nu)
+    freedom = np.broadcast_to(np.asarray(nu, dtype=np.float64), comparison.z.shape)[index]
+    p = 2 * stats.t.sf(np.abs(comparison.z[index]), freedom)
     out[index] = stats.false_discovery_control(p, method="bh") <= false_share
     return out

@@ -93,6 +93,16 @@ class Features:
         return self.levels.std_db
 
     @property
+    def own(self) -> NDArray[np.float64]:
+        """Share of each level that rests on a model alone, shape (n,)."""
+        return self.levels.own
+
+    @property
+    def repeat_db(self) -> NDArray[np.float64]:
+        """What the rest of it differs by from run to run, shape (n,)."""
+        return self.levels.repeat_db
+
+    @property
     def stands_out(self) -> NDArray[np.bool_]:
         """Where the level is more than noise alone would give; everywhere for what is no line."""
         return np.asarray(self.levels.height_db > self.levels.clear_db)

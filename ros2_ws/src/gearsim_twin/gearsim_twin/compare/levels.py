@@ -35,6 +35,11 @@ class Levels:
         Of power: where it lies, and the noise bandwidth it takes in; NaN for what is no power.
     gauss_db : ndarray
         Of modulations and statistics: level of stationary Gaussian noise; NaN for what noise leaves alone.
+    own : ndarray
+        Share of a predicted level that rests on a model alone, 0 to 1; what records of the healthy machine
+        had already is known better than models are (`familiar`). 1 where there are none.
+    repeat_db : ndarray
+        Standard deviation by which the rest differs from run to run of one machine.
     """
 
     level_db: Vector
@@ -44,6 +49,8 @@ class Levels:
     frequency_hz: Vector
     bandwidth_hz: Vector
     gauss_db: Vector
+    own: Vector
+    repeat_db: Vector
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -79,6 +86,8 @@ class Levels:
             filled(frequency_hz, np.nan),
             filled(bandwidth_hz, np.nan),
             filled(gauss_db, np.nan),
+            np.ones(level.size),
+            np.zeros(level.size),
         )
 
 
