@@ -45,8 +45,8 @@ def independent_share(stack: Stack, z: Array, systematic: Array) -> Array:
     The variance of a mean over a cluster of m equally correlated values is 1 + (m - 1) r times that of
     independent ones (Kish, Survey Sampling, 1965, 8.2); along a run the sum over the autocorrelation takes
     its place. The kinds of neighbourhood (along a run, channels, carrier bands, records) are taken as
-    separable, so for the systematic part their factors multiply. The rest of the variance is sampling's, which
-    is independent, and chance's, with the design effect that machines of the kind show.
+    separable, so for the systematic part their factors multiply. The rest of the variance is of sampling,
+    which is independent, and of chance, with the design effect that machines of the kind show.
     """
     held = np.clip(z, -_MOST_Z, _MOST_Z)
     shares = np.ones(len(stack.domains))
