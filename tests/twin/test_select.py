@@ -8,14 +8,19 @@ were named first and none by a wrong name, with 94 % of 217 intervals covering; 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from toy_rig import CAUSES, NAMES, TUNING, context_of, effect, solve, toy_case, yard_of
 
+from gearsim_twin import needed as needed_module
 from gearsim_twin.causes.prior import LogNormal
+from gearsim_twin.choices import Candidate, Choice, Round
 from gearsim_twin.fit import fit_tuning
+from gearsim_twin.holdout import Gain
 from gearsim_twin.intervals import numbers_of
 from gearsim_twin.model import Model
 from gearsim_twin.rivals import alternatives, rejected
@@ -123,6 +128,47 @@ def test_causes_that_cannot_be_told_apart_are_both_told_with_what_would_decide()
     assert choice.probability == pytest.approx(0.5, abs=0.05)
     assert other.probability == pytest.approx(0.5, abs=0.05)
     assert "a second load would decide" in other.signature
+
+
+class Named:
+    """A cause that is one of several names of a thing."""
+
+    def __init__(self, original, thing):
+        self.original, self._thing = original, thing
+        self.confused_with = getattr(original, "confused_with", ())
+
+    def __getattr__(self, name):
+        return getattr(self.original, name)
+
+    def thing(self, values):  # noqa: ARG002
+        return self._thing
+
+
+@pytest.mark.parametrize(("things", "sure"), [(("a race", "a race"), True), (("a race", "a cage"), False)])
+def test_two_names_of_one_thing_share_its_probability_and_leave_the_thing_sure(things, sure):
+    """Half for each name; all for the thing, if it is one."""
+    one = effect(np.random.default_rng(9), "outer", 1.5)
+    causes = (Named(CAUSES[0], things[0]), *CAUSES[1:], Named(Copy(CAUSES[0]), things[1]))
+    selection = solve(toy_case(9, [one]), causes=causes)
+    (choice,) = selection.choices
+    (other,) = alternatives(choice, selection)
+    assert choice.probability == pytest.approx(0.5, abs=0.05)
+    assert choice.thing_probability == pytest.approx(0.99 if sure else choice.probability, abs=0.02)
+    assert (other.thing == "a race") is sure
+
+
+def test_a_probability_counts_what_all_records_say():
+    """The rival leads by 1 nat in training and falls back by 4 on held-out records: odds of e^3, not e^-1."""
+    own, rival = (_candidate(name, lead, held) for name, lead, held in (("a", 9.0, 6.0), ("b", 10.0, 2.0)))
+    choice = Choice(Round((rival, own), (), 1), own)
+    found = needed_module._judged(choice, [choice], 9.0)
+    assert found.probability == pytest.approx(1 / (1 + math.exp(-3) + math.exp(-9)), rel=1e-9)
+
+
+def _candidate(name, lead, held):
+    extension = SimpleNamespace(cause=SimpleNamespace(name=name), key=(name, ""), values={})
+    fitted = SimpleNamespace(trial=SimpleNamespace(model=SimpleNamespace(extensions=(extension,))))
+    return Candidate(fitted, lead, gain=Gain("psd", 1.0, (0.5, 1.5), held, (held - 1.0, held + 1.0)))
 
 
 def test_freedom_costs():

@@ -27,6 +27,8 @@ __all__ = ["FILES", "lines", "new_folder", "run_judge"]
 FILES = ("twin.json", "extended.yaml", "report.html")
 _MOST_WORKERS = 2
 _SHOWN = 12
+# By so much a thing must be surer than its name for that to be said.
+_OPEN = 0.02
 
 
 def run_judge(case: Case, folder: Path, workers: int | None, seed: int) -> Verdict:
@@ -108,7 +110,13 @@ def _cause_lines(cause: dict[str, Any]) -> list[str]:
     place = f" of {cause['component']}" if cause.get("component") else ""
     gain = cause["heldout_gain_db"]
     told = "" if gain is None else f", held-out gain {gain:.2f} dB"
-    found = [f"cause: {cause['name']}{place}, probability {cause['probability']:.2f}{told}"]
+    form = f" by {cause['variant']}" if cause.get("variant") else ""
+    found = [f"cause: {cause['name']}{form}{place}, probability {cause['probability']:.2f}{told}"]
+    thing = cause.get("thing")
+    if thing and thing["probability"] > cause["probability"] + _OPEN:
+        found.append(
+            f"  sure is {thing['name']} (probability {thing['probability']:.2f}), whichever name it has"
+        )
     found.append(f"  {cause['signature']}")
     for name, number in cause["parameters"].items():
         low, high = number["ci95"]

@@ -59,6 +59,17 @@ class Candidate:
         """The cause with its values."""
         return self.fitted.trial.model.extensions[-1]
 
+    @property
+    def all_nats(self) -> float:
+        """Log odds by all records: evidence of those for training, and what that predicts of the others."""
+        return self.lead_nats + (0.0 if self.gain is None else self.gain.nats)
+
+    @property
+    def thing(self) -> str:
+        """What is wrong by this cause, where several causes are names of it; "" where there is no other."""
+        words = getattr(self.extension.cause, "thing", None)
+        return "" if words is None else str(words(self.extension.values))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Round:
@@ -94,6 +105,8 @@ class Choice:
         What it was there.
     probability : float
         That it is there, and none of its rivals in its place, given the final model.
+    thing_probability : float
+        That it or another name of the same thing is there.
     gain : Gain or None
         What it gains on held-out records in the final model.
     """
@@ -101,6 +114,7 @@ class Choice:
     round: Round
     candidate: Candidate
     probability: float = 0.0
+    thing_probability: float = 0.0
     gain: Gain | None = None
 
     @property

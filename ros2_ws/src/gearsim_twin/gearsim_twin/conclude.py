@@ -15,7 +15,7 @@ from gearsim_twin.compare.discrepancy import Comparison, compare, pooled
 from gearsim_twin.compare.merged import Discrepancy, discrepancies
 from gearsim_twin.intervals import numbers_of
 from gearsim_twin.labels import Label
-from gearsim_twin.rivals import alternatives, rejected
+from gearsim_twin.rivals import alternatives, rejected, variant_of
 from gearsim_twin.score import Scores
 from gearsim_twin.select import Selection
 from gearsim_twin.verdict import Found, Verdict, Word
@@ -118,6 +118,9 @@ def _found(choice: Choice, number: int, selection: Selection) -> Found:
         domain=gain.domain,
         probability=choice.probability,
         signature=extension.cause.signature(extension.values),
+        variant=variant_of(extension),
+        thing=choice.candidate.thing,
+        thing_probability=choice.thing_probability,
     )
 
 

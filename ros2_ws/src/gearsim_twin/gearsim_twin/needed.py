@@ -64,8 +64,7 @@ def needed(
         if not bad:
             rows = zip(choices, leads, gains, strict=True)
             return current, [
-                replace(choice, probability=_probability(choice, choices, lead), gain=gain)
-                for choice, lead, gain in rows
+                replace(_judged(choice, choices, lead), gain=gain) for choice, lead, gain in rows
             ]
         worst = min(bad, key=lambda k: leads[k])
         current, choices = without[worst], [*choices[:worst], *choices[worst + 1 :]]
@@ -78,10 +77,16 @@ def _without(bench: Workbench, yard: Yardstick, current: Fitted, number: int) ->
     return settled(bench, yard, judged(yard, trial, slopes))
 
 
-def _probability(choice: Choice, choices: list[Choice], lead_nats: float) -> float:
-    """Against no such cause, and against those rivals of its round that were not taken as well."""
+def _judged(choice: Choice, choices: list[Choice], lead_nats: float) -> Choice:
+    """With its probability against no such cause, and against those rivals of its round that were not taken.
+
+    Rivals count by what all records say, as when the cause was taken. Another name of the same thing speaks
+    against the name, not against the thing.
+    """
     taken = {each.key for each in choices}
-    own = choice.candidate.lead_nats
+    own = choice.candidate
     rivals = [each for each in choice.round.candidates if each.extension.key not in taken]
-    against = math.exp(-lead_nats) + sum(math.exp(min(each.lead_nats - own, 50.0)) for each in rivals)
-    return 1.0 / (1.0 + against)
+    odds = [(each, math.exp(min(each.all_nats - own.all_nats, 50.0))) for each in rivals]
+    alike = sum(value for each, value in odds if own.thing and each.thing == own.thing)
+    total = 1.0 + math.exp(min(-lead_nats, 50.0)) + sum(value for _, value in odds)
+    return replace(choice, probability=1.0 / total, thing_probability=(1.0 + alike) / total)

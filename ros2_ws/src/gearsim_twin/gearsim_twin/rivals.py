@@ -6,11 +6,12 @@ import math
 
 from gearsim_twin.choices import Candidate, Choice
 from gearsim_twin.intervals import numbers_of
+from gearsim_twin.model import Extension
 from gearsim_twin.select import Selection
 from gearsim_twin.settings import Settings
 from gearsim_twin.verdict import Found, Rejected
 
-__all__ = ["alternatives", "decided_by", "rejected"]
+__all__ = ["alternatives", "decided_by", "rejected", "variant_of"]
 
 LEAST_PROBABILITY = 0.1
 """Of a rival in place of a cause that was taken, for it to be told among the causes."""
@@ -39,9 +40,18 @@ def alternatives(choice: Choice, selection: Selection) -> tuple[Found, ...]:
                 probability=probability,
                 signature=f"in place of {choice.key[0]}: {extension.cause.signature(extension.values)}{told}",
                 instead_of=choice.key[0],
+                variant=variant_of(extension),
+                thing=rival.thing if rival.thing == choice.candidate.thing else "",
+                thing_probability=choice.thing_probability,
             )
         )
     return tuple(found)
+
+
+def variant_of(extension: Extension) -> str:
+    """Which form of a cause it is, where one name has several that could stand in each other's place."""
+    words = getattr(extension.cause, "variant", None)
+    return "" if words is None else str(words(extension.values))
 
 
 def decided_by(choice: Choice, rival: Candidate) -> str:
@@ -54,9 +64,9 @@ def decided_by(choice: Choice, rival: Candidate) -> str:
 def _rivals(choice: Choice, selection: Selection) -> list[tuple[Candidate, float]]:
     """Rivals of the round in which a cause was taken, each with its probability of being there instead."""
     taken = {each.key for each in selection.choices}
-    own = choice.candidate.lead_nats
+    own = choice.candidate.all_nats
     return [
-        (each, choice.probability * math.exp(min(each.lead_nats - own, 0.0)))
+        (each, choice.probability * math.exp(min(each.all_nats - own, 0.0)))
         for each in choice.round.candidates
         if each.extension.key not in taken
     ]

@@ -243,7 +243,7 @@ def _held_out(
         found[k] = replace(each, gain=gain)
     passed = {
         # Evidence of the training records, and what that predicts of the others: together that of all.
-        k: each.lead_nats + each.gain.nats
+        k: each.all_nats
         for k, each in enumerate(found)
         if each.lead_nats > least
         and each.gain is not None

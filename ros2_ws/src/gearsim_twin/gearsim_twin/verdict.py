@@ -46,6 +46,12 @@ class Found:
     instead_of : str
         The cause in whose place it could stand and from which the records cannot tell it; it is then not in
         the extended model.
+    variant : str
+        Which form of the cause it is, where one name has several.
+    thing : str
+        What is wrong in plain words, where several causes are names of it; else "".
+    thing_probability : float
+        That it is there, by whichever name.
     """
 
     name: str
@@ -57,6 +63,9 @@ class Found:
     probability: float
     signature: str
     instead_of: str = ""
+    variant: str = ""
+    thing: str = ""
+    thing_probability: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +170,23 @@ class Verdict:
         ]
         return (self.words(), f"Tuned: {tuned or 'nothing'}.", *(f"Fitted: {each}." for each in numbers))
 
+    def in_place_of(self, found: Found) -> list[str]:
+        """What could stand in place of a cause, a sentence each; other names of the same thing in one."""
+        others = [each for each in self.causes if each.instead_of == found.name]
+        same = [each for each in others if each.thing and each.thing == found.thing]
+        told = []
+        if same:
+            names = " or ".join(f"{_form(each)} ({each.probability:.2f})" for each in (found, *same))
+            sure = f"Sure is {found.thing} (probability {found.thing_probability:.2f})"
+            told.append(f"{sure}; open is whether it is {names}.")
+        told += [
+            f"{each.name} could stand in place of {found.name}: from these records the two cannot be told "
+            f"apart (probability {each.probability:.2f})."
+            for each in others
+            if each not in same
+        ]
+        return told
+
     def words(self) -> str:
         """The finding in plain words, a sentence or a few."""
         scores = self.scores.overall.models
@@ -170,12 +196,9 @@ class Verdict:
                 f"(held-out error {scores['tuned_only'].value:.1f} dB)."
             )
         named = [each for each in self.causes if each.name != "unknown" and not each.instead_of]
-        parts = [_sentence(each) for each in named]
-        parts += [
-            f"{each.name} could stand in place of {each.instead_of} (probability {each.probability:.2f})."
-            for each in self.causes
-            if each.instead_of
-        ]
+        parts = []
+        for each in named:
+            parts += [_sentence(each), *self.in_place_of(each)]
         unknown = next((each for each in self.causes if each.name == "unknown"), None)
         if unknown is not None:
             parts.append(
@@ -190,6 +213,11 @@ def _sentence(found: Found) -> str:
     told = f" ({numbers})" if numbers else ""
     gain = f"the held-out {found.domain} error falls by {found.heldout_gain_db:.1f} dB"
     return f"The model misses {_name(found)}{told}: {found.signature}; with it {gain}."
+
+
+def _form(found: Found) -> str:
+    """Its name, and which form of the cause it is."""
+    return f"{found.name} by {found.variant}" if found.variant else found.name
 
 
 def _name(found: Found) -> str:
@@ -216,6 +244,10 @@ def _found(found: Found) -> dict[str, Any]:
         "signature": found.signature,
         "domain": found.domain,
         "instead_of": found.instead_of,
+        "variant": found.variant,
+        "thing": {"name": found.thing, "probability": round(found.thing_probability, 4)}
+        if found.thing
+        else None,
     }
 
 

@@ -70,13 +70,9 @@ def headline(verdict: Verdict) -> tuple[str, str, str]:
 
 def finding(verdict: Verdict) -> list[str]:
     """What was found, a paragraph per cause."""
-    told = [_sentence(verdict, each) for each in taken(verdict)]
-    told += [
-        f"{cause_name(each)} could stand in place of {each.instead_of.replace('_', ' ')}: from these records "
-        f"the two cannot be told apart (probability {each.probability:.2f})."
-        for each in verdict.causes
-        if each.instead_of
-    ]
+    told = []
+    for each in taken(verdict):
+        told += [_sentence(verdict, each), *verdict.in_place_of(each)]
     return told
 
 
