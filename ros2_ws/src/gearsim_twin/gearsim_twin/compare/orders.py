@@ -51,24 +51,29 @@ def measure(material: Material, wanted: Sequence[Place]) -> Levels:
     at = np.array([place.at for place in wanted])
     level, std, height, clear = (np.full(at.size, np.nan) for _ in range(4))
     hz, bandwidth = np.full(at.size, np.nan), np.full(at.size, np.nan)
+    in_orders = np.array([place.unit == "order" for place in wanted], dtype=np.bool_)
+    # High multiples of a turn are read over time, at the record's own speed.
+    over_angle = in_orders & (at <= (_top(material.frame) if material.frame.has_orders else np.inf))
+    where = at * np.where(in_orders & ~over_angle, material.speed_hz, 1.0)
     for channel in dict.fromkeys(place.channel for place in wanted):
-        for unit in ("order", "Hz"):
-            rows = np.array([p.channel == channel and p.unit == unit for p in wanted])
+        for over_time in (False, True):
+            rows = (over_angle != over_time) & np.array([p.channel == channel for p in wanted])
             if not rows.any():
                 continue
-            lines, step_hz, half = _lines(material, channel, unit, at[rows])
+            lines, step_hz, half = _lines(material, channel, over_time, where[rows])
             level[rows], std[rows] = lines.level_db, lines.std_db
             height[rows], clear[rows] = lines.height_db, lines.clear_db
-            hz[rows] = at[rows] * (material.speed_hz if unit == "order" else 1.0)
+            hz[rows] = where[rows] * (1.0 if over_time else material.speed_hz)
             bandwidth[rows] = (2 * half + 1) * step_hz
     return Levels.of(level, std, height_db=height, clear_db=clear, frequency_hz=hz, bandwidth_hz=bandwidth)
 
 
 def _lines(
-    material: Material, channel: str, unit: str, at: NDArray[np.float64]
+    material: Material, channel: str, over_time: bool, at: NDArray[np.float64]
 ) -> tuple[LineLevels, float, NDArray[np.intp]]:
+    """Lines over time, at frequencies, or over the angle, at orders; step in Hz, half widths in bins."""
     frame = material.frame
-    if unit == "Hz":
+    if over_time:
         spectra = material.time_spectra(channel)
         half = np.full(at.size, 2, dtype=np.intp)
         return line_levels(spectra, at, half), spectra.step, half

@@ -2,7 +2,8 @@
 
 A line over time is a shaft's if it is as strong over the angle and lies at a multiple of a shaft's turn
 there. Low multiples and those near a mesh are compared anyway; others are told here with the shaft's name.
-What changes its frequency with the shaft is told from what does not by where the line is stronger.
+What changes its frequency with the shaft is told from what does not by where the line is stronger. Speeds
+differ from record to record, so a shaft's line has its place in orders, wherever it is read.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.signal import find_peaks
 
 from gearsim_dsp.angle.tracked_orders import all_mesh_orders
 from gearsim_dsp.noise_floor import LineTail
+from gearsim_dsp.spectra import good_length
 from gearsim_io.nameplate import Machine
 from gearsim_twin.compare.families import find
 from gearsim_twin.compare.known_orders import nearest_turn
@@ -35,6 +37,7 @@ _SHAFT_HARMONICS, _MESH_TURNS = 10, 5
 _NEAR_SHARE = 0.03
 _SUPPLY_HZ = (50.0, 60.0)
 _SUPPLY_MULTIPLES = 20
+_LINE_BINS = 6.0  # nearer lines run into one another
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,35 +79,57 @@ def tones(material: Material, channel: str, top_order: float) -> list[Tone]:
         hz = _refined(over_time.mean, k) * over_time.step
         if hz > frame.top_hz:
             break
-        turn = None if over_angle is None else _turn(material, over_angle, over_time, hz, k)
+        turn = None if over_angle is None else _turn(material, channel, top_order, hz, k)
         if turn is not None and _is_expected(frame.machine, hz / material.speed_hz):
             continue
         name = _name(material, channel, hz, 1.5 * over_time.step)
-        if name is not None:
-            label = name if turn is None else f"{turn} or {name}" if "supply" in name else turn
-            found.append(Tone(hz, "Hz", label, 10 * math.log10(ratio)))
+        if name is None:
+            continue
+        height_db = 10 * math.log10(ratio)
+        if turn is None or "supply" in name:
+            found.append(Tone(hz, "Hz", name if turn is None else f"{turn[1]} or {name}", height_db))
+        else:
+            found.append(Tone(turn[0], "order", turn[1], height_db))
     if over_angle is not None:
         found += _in_orders(material, channel, over_angle, over_time)
     return found
 
 
-def _turn(
-    material: Material, over_angle: WindowSpectra, over_time: WindowSpectra, hz: float, k: int
-) -> str | None:
-    """The multiple of a shaft that a line over time is, if it is one."""
-    order = hz / material.speed_hz
+def _turn(material: Material, channel: str, top_order: float, hz: float, k: int) -> tuple[float, str] | None:
+    """The multiple of a shaft that a line over time is, if it is one, and its name; `k` is its bin."""
     machine = material.frame.machine
+    over_time = material.time_spectra(channel)
+    step_hz = over_time.step
+    slowest_hz = min(shaft.ratio for shaft in machine.shafts) * material.speed_hz
+    if slowest_hz < _LINE_BINS * step_hz:
+        # Multiples of a slow turn run into one another there, and their tops are no line's place.
+        hz, step_hz = _placed(material, channel, hz, 2 * step_hz)
+    order = hz / material.speed_hz
     # Between bins a line is placed to better than half of one.
-    near = 0.5 * over_time.step / material.speed_hz + 2 * material.frame.smear * order
-    shaft = min(machine.shafts, key=lambda s: abs(order - round(order / s.ratio) * s.ratio))
-    number = round(order / shaft.ratio)
-    if abs(order - number * shaft.ratio) > near:
+    near = 0.5 * step_hz / material.speed_hz + 2 * material.frame.smear * order
+    multiples = [(round(order / s.ratio), s) for s in machine.shafts]
+    # Of a multiple of several turns the fastest one tells most.
+    hits = [(n, s) for n, s in multiples if n and abs(order - n * s.ratio) <= near]
+    if not hits:
         return None
+    number, shaft = max(hits, key=lambda hit: hit[1].ratio)
+    over_angle = material.order_spectra(channel, top_order)
     index = round(number * shaft.ratio / over_angle.step)
-    inside = index < over_angle.power.shape[1] - 3
+    inside = number * shaft.ratio <= top_order and index < over_angle.power.shape[1] - 3
     if inside and _line(over_angle.mean, index, 2) < _SHARE * _line(over_time.mean, k, 2):
         return None
-    return f"{number} x {shaft.name}"
+    return number * shaft.ratio, f"{number} x {shaft.name}"
+
+
+def _placed(material: Material, channel: str, hz: float, within_hz: float) -> tuple[float, float]:
+    """Where the highest line near a frequency lies in the spectrum of the whole record, and its bins."""
+    step_hz = material.rate_hz / good_length(material.samples(channel).size)
+    lines = np.abs(material.lines(channel)) ** 2
+    first = max(2, math.ceil((hz - within_hz) / step_hz))
+    last = min(math.floor((hz + within_hz) / step_hz), lines.size - 3)
+    if last < first:
+        return hz, step_hz
+    return _refined(lines, first + int(np.argmax(lines[first : last + 1]))) * step_hz, step_hz
 
 
 def _is_expected(machine: Machine, order: float) -> bool:
@@ -199,7 +224,10 @@ def strongest(
 
 def _floor_db(material: Material, channel: str, tone: Tone, top_order: float) -> float:
     """Noise per bin at a tone's place."""
-    over_time = tone.unit == "Hz"
+    at = tone.at
+    over_time = tone.unit == "Hz" or tone.at > top_order
+    if over_time and tone.unit == "order":
+        at *= material.speed_hz
     spectra = material.time_spectra(channel) if over_time else material.order_spectra(channel, top_order)
-    index = min(round(tone.at / spectra.step), spectra.floor.size - 1)
+    index = min(round(at / spectra.step), spectra.floor.size - 1)
     return 10 * math.log10(max(float(spectra.floor[index]), 1e-300))
