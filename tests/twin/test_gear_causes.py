@@ -71,6 +71,8 @@ def first(name: str, context: Context) -> dict[str, Any]:
     [
         ("unbalance", "unbalance", "output", {"unbalance_kg_m": 0.005, "phase_rad": 2.0}, "unbalance_kg_m"),
         ("unbalance", "unbalance", "input", {"unbalance_kg_m": 0.05, "phase_rad": -1.0}, "unbalance_kg_m"),
+        # More than the weight of the shaft and the load of the teeth: bearings and mesh part.
+        ("unbalance", "unbalance", "input", {"unbalance_kg_m": 0.18, "phase_rad": 0.5}, "unbalance_kg_m"),
         ("looseness", "looseness", "bearing_2", {"reduction": 0.4}, "reduction"),
         ("looseness", "looseness", "bearing_4", {"reduction": 0.9}, "reduction"),
         ("misalignment", "shaft_misalignment", "input", {"offset_m": 0.0, "angle_rad": 0.02}, "angle_rad"),
@@ -84,6 +86,16 @@ def test_the_shaft_or_foot_is_named_with_its_size(
     assert guess[value] == pytest.approx(params[value], rel=0.25)
     if "phase_rad" in params:
         assert abs(math.remainder(guess["phase_rad"] - params["phase_rad"], 2 * math.pi)) < 0.2
+
+
+def test_a_coupling_is_out_of_line_in_a_direction():
+    """Against the load: balls and teeth are unloaded twice a turn; across it the foot would be shaken."""
+    params = {"offset_m": 2.6e-4, "angle_rad": 0.0045, "direction_rad": -2.0}
+    guess = first("misalignment", gear_context("lpm34", fault("shaft_misalignment", "input", **params)))
+    assert guess["component"] == "input"
+    # Eight directions are tried, and an offset with more of an angle than this one has.
+    assert abs(math.remainder(guess["direction_rad"] + 2.0, 2 * math.pi)) < math.pi / 5
+    assert guess["offset_m"] == pytest.approx(2.6e-4, rel=0.5)
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,7 @@ _LEAST_OF_PLANETS = 0.01
 _SHAPE = 0.25  # shapes of answers are right to about that part of what deviates
 _ANGLES = 72
 _AGAIN = 3
+_ANEW, _OTHER_LOG = 4, math.log(1.5)
 _LAID = 2  # times that a record is laid over the model and what was found so far
 _LEAST_SQUARE = 0.01
 _MOST_KEPT = 48
@@ -112,7 +113,8 @@ def matches(
     signed : bool
         Whether the opposite effect exists.
     top : int, optional
-        Lines of the turn of which at least two must deviate clearly; all by default.
+        Lines of the turn, and on both sides of those of the mesh, of which at least two must deviate clearly;
+        all by default.
     twins : bool
         Whether the effect is the same on a wheel and on its mate of as many teeth; then one is looked at.
         What wears or breaks from the root outwards is not: the one begins to bear where the other ends.
@@ -124,9 +126,8 @@ def matches(
         first = [_match(context, record, part, effect, unit) for part in once]
         found += [match for match in first if match is not None and match.drop >= _LEAST_DROP / 2]
     found.sort(key=lambda match: -match.drop)
-    if power != 1.0:  # the shape of the answer changes with the size
-        again = [_match(context, _records(context)[0], one.part, effect, one.value) for one in found[:_AGAIN]]
-        found = [match for match in again if match is not None]
+    again = [_anew(context, one, effect, unit) for one in found[:_AGAIN]]
+    found = sorted((match for match in again if match is not None), key=lambda match: -match.drop)
     return [match for match in found if match.drop >= _LEAST_DROP and match.share >= _LEAST_SHARE]
 
 
@@ -140,6 +141,23 @@ class _Effect:
     power: float
     signed: bool
     top: int | None
+
+
+def _anew(context: Context, found: Match, effect: _Effect, unit: float) -> Match | None:
+    """The same at the size that was found, and again there, until it is the one that was simulated.
+
+    Shapes of answers change with the size: teeth and balls part, elements reach the bottom.
+    """
+    best, size = None if effect.power != 1.0 else found, unit
+    for _ in range(_ANEW):
+        if best is not None and abs(math.log(best.value / size)) < _OTHER_LOG:
+            break
+        size = (best or found).value
+        match = _match(context, _records(context)[0], found.part, effect, size)
+        if match is None or (best is not None and match.drop <= best.drop):
+            break
+        best = match
+    return best
 
 
 def _once(parts: Sequence[Part]) -> list[Part]:
@@ -163,9 +181,7 @@ def _match(context: Context, record: int, part: Part, effect: _Effect, size: flo
     """The effect of one size on one part, scaled."""
     turns = period(context, record, part)
     own = deviation(context, record, turns)
-    if own is None or np.count_nonzero(own.excess[:, : effect.top] > _STANDS_OUT) < _least(
-        context, effect, own
-    ):
+    if own is None or not _deviates(context, part, effect, own):
         return None
     content = effect.build(context.contents[record], part, size)
     with_it = _lines(context, record, turns, content)
@@ -182,12 +198,20 @@ def _match(context: Context, record: int, part: Part, effect: _Effect, size: flo
     return replace(match, value=float(np.clip(size * match.value ** (1.0 / effect.power), *effect.bounds)))
 
 
-def _least(context: Context, effect: _Effect, own: Deviation) -> int:
-    """Lines that must deviate before anything is simulated; drawn errors of planets let some deviate."""
+def _deviates(context: Context, part: Part, effect: _Effect, own: Deviation) -> bool:
+    """Whether there is anything to be explained; else nothing is simulated."""
+    line = np.arange(own.values.shape[1])
+    if effect.top is not None:
+        mesh = max(2, round(part.teeth * part.turns / own.turns)) if part.teeth > 1 else line.size * 2
+        beside = np.abs((line + mesh // 2) % mesh - mesh // 2)
+        line = line[(line < effect.top) | ((beside > 0) & (beside < effect.top))]
+    excess = own.excess[:, line]
+    number = np.count_nonzero(excess > _STANDS_OUT)
     if has_planets(context.contents[own.record]) and effect.angle != "none":
-        return max(_LEAST_LINES, round(_LEAST_OF_PLANETS * own.values.size))
-    # What comes once per turn is one line in each channel.
-    return min(_LEAST_LINES, int(own.values.shape[0]))
+        # Drawn errors of planets let some lines deviate.
+        return bool(number >= max(_LEAST_LINES, round(_LEAST_OF_PLANETS * own.values.size)))
+    # What comes once per turn is one line, and one channel may be all that is near.
+    return bool(number >= min(_LEAST_LINES, excess.shape[0]) or np.any(excess > _LEAST_DROP))
 
 
 def _by_angle(
