@@ -10,6 +10,7 @@ import pytest
 from gearsim_io.machines import load_machine
 from gearsim_io.record import PulseTrain, Record
 from gearsim_twin.compare.features import Features, Plan, features, make_plan
+from gearsim_twin.compare.merged import base
 from gearsim_twin.view import View, view_of
 
 RATE_HZ, SECONDS = 16384.0, 3.2
@@ -75,3 +76,14 @@ def test_a_neighbours_line_between_them_is_still_a_tone() -> None:
     (row,) = _tones(plan)
     assert (plan.places[row].unit, plan.places[row].label) == ("Hz", "tone")
     assert plan.places[row].at == pytest.approx(strange_hz, abs=0.2)
+
+
+def test_where_windows_are_short_lines_of_bearings_are_first_those_of_gears_and_planets() -> None:
+    plan, _ = _shown([_view(2.1391, {80: 0.2}, 4, "unsw_planetary", "carrier")], "unsw_planetary")
+    names = {place.label for place in plan.places if place.domain == "envelope" and place.kind == "line"}
+    # Orders 52.7 and 52 are 0.7 of a turn apart, the lines of a window of 2.7 turns as wide as 1.9.
+    assert "13 x planet or 2 x BPFO of planet_1_bearing and 2 alike" in names
+    things = {base(name) for name in names if "BPFO" in name}
+    assert things == {
+        f"{turn} or BPFO of planet_1_bearing and 2 alike" for turn in ("input", "output", "planet")
+    }

@@ -90,12 +90,28 @@ def _of_family(
     found = []
     for k in range(1, _HARMONICS + 1):
         if k * family.order < frame.highest_envelope_order:
-            label = f"{k} x {family.label}"
+            label = _named(frame, k * family.order, f"{k} x {family.label}")
             found.append(Place("envelope", channel, "line", k * family.order, "order", width, label, band))
     if _sidebands(frame, family):
         name = f"sidebands of {family.label}"
         found.append(Place("envelope", channel, "sideband", family.order, "order", width, name, band))
     return found
+
+
+def _named(frame: Frame, order: float, name: str) -> str:
+    """What a bearing's line may be where windows are too short to tell it from multiples of a slow turn.
+
+    Gears and planets have lines there in any machine, bearings where they are damaged: these come second.
+    """
+    if _parts_turns(frame):
+        return name
+    near = [
+        (shaft.ratio, f"{round(order / shaft.ratio)} x {shaft.name}")
+        for shaft in frame.machine.shafts
+        if abs(order - round(order / shaft.ratio) * shaft.ratio) < 0.5 * _width(frame, order)
+    ]
+    # Of a multiple of several turns the fastest one tells most.
+    return f"{max(near)[1]} or {name}" if near else name
 
 
 def _width(frame: Frame, order: float) -> float:

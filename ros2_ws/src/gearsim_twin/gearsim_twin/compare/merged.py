@@ -131,6 +131,9 @@ def _thing(place: Place) -> tuple[object, ...]:
 
 def base(label: str) -> str:
     """What a line belongs to: "2 x mesh gears +1 x input" is of "mesh gears"."""
+    first, either, other = label.partition(" or ")
+    if either:
+        return f"{base(first)} or {base(other)}"
     label = label.removeprefix("sidebands of ")
     plain = re.sub(r"^[\d.]+ x (?!\D*\bHz\b)", "", label)
     return re.sub(r" [+-]\d+ x .*$", "", plain)
