@@ -21,7 +21,7 @@ from gearsim_twin.causes.bearing_signs import signs_of
 from gearsim_twin.causes.cause import Cause, Content
 from gearsim_twin.causes.context import Context
 from gearsim_twin.channels import telling_channels
-from gearsim_twin.compare.chains import Nuisance, behind
+from gearsim_twin.compare.chains import Nuisance, apply, behind
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import Features, Plan, features, make_plan
 from gearsim_twin.compare.merged import discrepancies
@@ -38,6 +38,7 @@ from gearsim_twin.score import score_models
 from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
 from gearsim_twin.simulated import Simulator
+from gearsim_twin.stated_floor import without_floor
 from gearsim_twin.taught import Taught
 from gearsim_twin.tuning import Tuning, tuning_of
 from gearsim_twin.verdict import Verdict
@@ -111,8 +112,11 @@ class Bench:
         then = partial(features, plan=plan)
 
         def run(jobs: Sequence[Job]) -> Sequence[Features | None]:
-            named = [(numbers[k], content) for k, content in jobs]
-            return self.simulator.tried(named, then, self.seconds, self.settings.seed)
+            bare = [without_floor(content) for _, content in jobs]
+            named = [(numbers[k], content) for (k, _), (content, _) in zip(jobs, bare, strict=True)]
+            made = self.simulator.tried(named, then, self.seconds, self.settings.seed)
+            pairs = zip(bare, made, strict=True)
+            return [None if each is None else apply(floor, each) for (_, floor), each in pairs]
 
         return Workbench(
             measured=tuple(features(self.views[k], plan) for k in numbers),

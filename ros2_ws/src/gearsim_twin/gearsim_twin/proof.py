@@ -46,6 +46,8 @@ def proof_nats(extension: Extension, heldout: Context) -> float:
     if extension.free or not getattr(cause, "proven", False) or not cause.applies(heldout):
         return 0.0
     again = any(_alike(extension, start) for start in cause.starts(heldout))
+    if not again and (seen := getattr(cause, "seen_again", None)) is not None:
+        again = float(seen(extension.values, heldout)) > REPEATED_NATS
     return REPEATED_NATS + extension.reading_nats if again else 0.0
 
 

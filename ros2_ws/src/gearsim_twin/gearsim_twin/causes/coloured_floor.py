@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_twin.causes.between_lines import between_lines
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_sensor
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spectra_beside import Beside, CurveFit, by_channel, fit_curve
+from gearsim_twin.causes.spectra_beside import Beside, CurveFit, fit_curve
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -19,9 +20,7 @@ __all__ = ["ColouredFloor"]
 
 Array = NDArray[np.float64]
 
-_LEAST_DROP = 30.0
-_LEAST_SHARE = 0.2
-_LEAST_BANDS = 6  # half an octave in which the floor lies above the model
+_LEAST_OCTAVES = 1.0  # in which the floor lies above the model
 _OVER_DB = 3.0
 # A white floor is any sensor's own, whatever its height; usual ones rise by 2 dB at most from there on down.
 _RISE_HZ, _LEAST_RISE_DB = 40.0, 4.0
@@ -36,8 +35,8 @@ def floor_db(frequency_hz: Array, density: float, corner_hz: float) -> Array:
     return np.asarray(20 * np.log10(density) + 10 * np.log10(1 + corner_hz / frequency_hz))
 
 
-def _floor(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG001
-    """Density and corner, if adding such a floor to the model mends it over half an octave at least."""
+def _floor(data: Beside) -> CurveFit | None:
+    """Density and corner of the floor, if the bands that it rules follow its law and rise."""
     f = data.frequency_hz
 
     def predicted(p: Array) -> Array:
@@ -47,20 +46,21 @@ def _floor(data: Beside, sample_rate_hz: float) -> CurveFit | None:  # noqa: ARG
     quiet = float(np.quantile(data.measured_db, 0.1))
     starts = [(quiet + up, corner) for up in (-6.0, 0.0) for corner in (0.0, 2.0, 3.5)]
     fit = fit_curve(data, predicted, starts, ((-300.0, -2.0), (200.0, 5.0)), gain=False)
-    added = floor_db(f, 10 ** (fit.values[0] / 20), 10 ** fit.values[1])
-    lifted = added > data.simulated_db + _OVER_DB
-    if fit.drop < _LEAST_DROP or fit.share < _LEAST_SHARE or np.count_nonzero(lifted) < _LEAST_BANDS:
+    density, corner = 10 ** (fit.values[0] / 20), 10 ** fit.values[1]
+    lifted = floor_db(f, density, corner) > data.simulated_db + _OVER_DB
+    rise = 10 * np.log10(1 + corner / _RISE_HZ)
+    if _octaves(f[lifted]) < _LEAST_OCTAVES or fit.std[1] > _VAGUE or rise < _LEAST_RISE_DB:
         return None
-    rise = 10 * np.log10(1 + 10 ** fit.values[1] / _RISE_HZ)
     off = np.abs(data.measured_db - predicted(fit.values))[lifted]
-    if fit.std[1] > _VAGUE or rise < _LEAST_RISE_DB:
-        return None
     if np.median(off) > _USUALLY_OFF_DB or np.quantile(off, 0.9) > _HARDLY_OFF_DB:
         return None
-    density, corner = 10 ** (fit.values[0] / 20), 10 ** fit.values[1]
-    values = np.array([density, corner])
-    std = np.array([0.1151 * fit.std[0] * density, 2.3026 * min(fit.std[1], 3.0) * corner])
-    return CurveFit(values, std, fit.gain_db, fit.drop, fit.share)
+    std = np.array([0.1151 * fit.std[0] * density, 2.3026 * fit.std[1] * corner])
+    return CurveFit(np.array([density, corner]), std, fit.gain_db, fit.drop, fit.share)
+
+
+def _octaves(frequency_hz: Array) -> float:
+    """What bands reach over; 0 of none."""
+    return float(np.log2(frequency_hz.max() / frequency_hz.min())) if frequency_hz.size else 0.0
 
 
 class ColouredFloor:
@@ -84,7 +84,10 @@ class ColouredFloor:
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The channels whose floor is lifted, the densities as shares of the clearest one's."""
-        found = by_channel(context, _floor, floor=True)
+        pairs = list(zip(context.views, context.simulated_views, strict=True))
+        beside = {channel: between_lines(pairs, channel) for channel in context.views[0].record.channels}
+        fits = {channel: _floor(data) for channel, data in beside.items() if data is not None}
+        found = {channel: fit for channel, fit in fits.items() if fit is not None}
         if not found:
             return []
         top = max(found.values(), key=lambda fit: fit.drop)

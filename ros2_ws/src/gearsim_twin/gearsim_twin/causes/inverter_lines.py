@@ -13,6 +13,7 @@ from scipy.special import jv
 from gearsim_dsp.electrical import find_electrical_lines
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_sensor
+from gearsim_twin.causes.expected_lines import odds_of_lines
 from gearsim_twin.causes.lines import LineSpectrum, MachineLines, line_spectrum, machine_lines
 from gearsim_twin.causes.prior import LogNormal, Uniform
 
@@ -258,6 +259,7 @@ class InverterLines:
     """Lines of a frequency converter coupled into the measuring chain."""
 
     name = "inverter_lines"
+    superposes = True
     proven = True  # its finder has a false alarm rate of its own
     parameters: tuple[Parameter, ...] = (
         Parameter("amplitude_m_s2", "m/s^2", LogNormal(0.1, 6.0, 1e-6, 1e4)),
@@ -299,6 +301,30 @@ class InverterLines:
             "output_hz": best.output_hz,
         }
         return [start | {f"share:{name}": share for name, share in shares.items()}]
+
+    def seen_again(self, values: Values, heldout: Context) -> float:
+        """Log odds of those lines in other records; 0 where only a carrier without its groups was read."""
+        carrier, output = float(values["carrier_hz"]), float(values["output_hz"])
+        amplitude, modulation = float(values["amplitude_m_s2"]), float(values["modulation"])
+        total = 0.0
+        for view in heldout.views if output > 0.0 else ():
+            known, rate = machine_lines(view), view.record.sample_rate_hz
+            lines = []
+            for name in view.record.channels:
+                share = float(values.get(f"share:{name}", 0.0))
+                samples = view.signal(name)
+                spectrum = line_spectrum(samples, rate) if share > 0.0 else None
+                if spectrum is None:
+                    continue
+                for m, n in _PATTERN:
+                    at = m * carrier + n * output
+                    if _LOWEST_CARRIER_HZ < at < 0.47 * rate and not known.explain(
+                        at, spectrum.step_hz, False
+                    ):
+                        height = amplitude * share * line_ratio(m, n, modulation)
+                        lines.append((height, *spectrum.sine(samples, at)))
+            total += odds_of_lines(lines)
+        return total
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """The content with the converter's lines on the channels that show them."""

@@ -7,6 +7,7 @@ probability is the ratio itself.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,6 +34,7 @@ _TRIALS = 61
 _PROJECTIONS = 3
 _MOST_ORDERS = 600
 _ABOUT, _SAME_LINE = 2, 1e-3
+BESIDE, SKIRT = 25, 4  # lines: what lies beside one tells its noise
 _NEIGHBOURS = 6.0  # lines: orders so near are fitted beside a sine
 
 
@@ -48,11 +50,14 @@ class LineSpectrum:
         Power over the local floor: minus the logarithm of the probability that noise gives as much.
     amplitude : ndarray, shape (lines,)
         Of a sine at that line, in the unit of the signal.
+    count : int
+        Samples that were taken.
     """
 
     step_hz: float
     evidence: Array
     amplitude: Array
+    count: int
 
     def at(self, frequency_hz: Array) -> Array:
         """Greatest evidence within one line of each frequency; 0 beyond the spectrum."""
@@ -61,6 +66,19 @@ class LineSpectrum:
         safe = np.where(inside, line, 1)
         top = np.maximum(self.evidence[safe], np.maximum(self.evidence[safe - 1], self.evidence[safe + 1]))
         return np.asarray(np.where(inside, top, 0.0))
+
+    def sine(self, samples: NDArray[np.floating], frequency_hz: float) -> tuple[Array, Array]:
+        """Amplitudes of cosine and sine in the samples of this spectrum, and the inverse of their covariance.
+
+        Noise of the power P in a line has the variance P / 2 in both.
+        """
+        x = np.asarray(samples[: self.count], dtype=np.float64)
+        window = np.hanning(x.size + 1)[:-1]
+        turning = np.exp(-2j * np.pi * frequency_hz / (self.step_hz * x.size) * np.arange(x.size))
+        value = 2.0 * complex(np.sum(window * (x - x.mean()) * turning)) / float(window.sum())
+        line = round(frequency_hz / self.step_hz)
+        variance = 0.5 * float(self.amplitude[line]) ** 2 / max(float(self.evidence[line]), 1e-12)
+        return np.array([value.real, -value.imag]), np.eye(2) / max(variance, 1e-300)
 
     def height(self, frequency_hz: float) -> float:
         """Amplitude of a sine between two lines: the Hann window's main lobe undone."""
@@ -96,7 +114,7 @@ def line_spectrum(samples: NDArray[np.floating], sample_rate_hz: float) -> LineS
     floor = local_floor(power, _BLOCK_LINES, 1.0, _FIRST_LINE)
     # Rounding of float32 samples is a floor of its own: what is below it is no line.
     floor = np.maximum(floor, 1e-14 * power.max())
-    return LineSpectrum(sample_rate_hz / count, power / floor, 2.0 * spectrum / window.sum())
+    return LineSpectrum(sample_rate_hz / count, power / floor, 2.0 * spectrum / window.sum(), count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +204,41 @@ class SlowPart:
         weight, orders, rest = self._beside(frequency_hz)
         solved, _ = _sine(self._turning(frequency_hz), weight, orders, rest)
         return float(np.hypot(*solved))
+
+    def sine(self, frequency_hz: float, noise: float) -> tuple[Array, Array]:
+        """Amplitudes of cosine and sine beside the shafts' orders, and the inverse of their covariance.
+
+        Parameters
+        ----------
+        frequency_hz : float
+        noise : float
+            Variance that the noise about that line would have, were it white: of `line_noise`. What orders
+            and sine leave counts in its place where it is more: orders that swell are no noise, but hide a
+            line as noise does.
+        """
+        weight, orders, left = self._beside(frequency_hz)
+        plain = self._turning(frequency_hz)
+        pair = weight[:, None] * plain
+        pair = pair - orders @ (orders.T @ pair)
+        solved, _ = _sine(plain, weight, orders, left)
+        left = weight * (left - pair @ solved)
+        near = float(np.mean([self._power(left, frequency_hz, k) for k in range(-_ABOUT, _ABOUT + 1)]))
+        variance = max(noise, near / float(np.sum(weight**4)))
+        spread = variance * (pair.T @ (weight[:, None] ** 2 * pair))
+        normal = pair.T @ pair
+        return solved, np.asarray(normal @ np.linalg.pinv(spread) @ normal)
+
+    def line_noise(self, frequency_hz: float, without_orders: Array) -> float:
+        """Variance of white noise as strong as what lies beside a line of `without_orders`."""
+        window = np.hanning(self.signal.size + 2)[1:-1]
+        sides = [*range(-BESIDE, -SKIRT), *range(SKIRT + 1, BESIDE + 1)]
+        power = [self._power(window * without_orders, frequency_hz, k) for k in sides]
+        return float(np.median(power)) / math.log(2.0) / float(np.sum(window**2))
+
+    def _power(self, windowed: Array, frequency_hz: float, line: int) -> float:
+        """Of a windowed signal, so many lines beside a frequency."""
+        step = self.sample_rate_hz / self.signal.size
+        return float(np.sum((windowed @ self._turning(frequency_hz + line * step)) ** 2))
 
     def share_beyond_orders(self, frequency_hz: float) -> float:
         """Share of one sine in all that the shafts' orders leave within some lines of it."""

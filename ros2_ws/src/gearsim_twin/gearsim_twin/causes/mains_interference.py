@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,7 +12,11 @@ import numpy as np
 from gearsim_dsp.noise_floor import comb_false_alarm
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_sensor
+from gearsim_twin.causes.expected_lines import odds_of_lines
+from gearsim_twin.causes.hum_in_all import HumLines, hum_in_all
 from gearsim_twin.causes.lines import (
+    BESIDE,
+    SKIRT,
     LineSpectrum,
     MachineLines,
     SlowPart,
@@ -30,16 +35,17 @@ __all__ = ["Hum", "MainsInterference", "find_hum"]
 _SUPPLIES_HZ = (50.0, 60.0)
 _DRIFT = 0.001  # EN 50160 allows 1 % for 99.5 % of a year; grids keep within 0.1 % nearly always
 _ORDERS = tuple(range(1, 13))
+_WANDERING = (-4e-4, -2e-4, 0.0, 2e-4, 4e-4)  # from one record to another
 _CAP = 25.0  # of one line's evidence, so that no single line makes a comb
 _FALSE_ALARM = 1e-6
 _LINE = 12.0  # evidence of a line that counts by itself: 1e-5 of noise
+_HINT = 3.0  # evidence of a line that may be one
 _LOW = 3  # hum shows in one of its first orders, unless these are the machine's
 _ALONE = 25.0  # evidence of a fundamental that needs no harmonics
 _TOP_HZ = 800.0
 _LEAST_SHARE = 1e-6  # of hum in the signal's power: rounding and leakage are not hum
 _OWN = 0.25
 _AMPLITUDE_ERROR = 0.05  # of a line whose power is ten times the floor or more, beside an order
-_BESIDE, _SKIRT = 25, 4  # lines
 _LEAST_S = 0.8  # forty periods
 # Of what the shafts' orders leave about a line, so much in one sine at the supply's frequency: what orders
 # leave of themselves lies on both sides of them alike.
@@ -87,8 +93,14 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
         reach = _DRIFT * supply
         trials = np.arange(-reach, reach + 1e-9, 0.25 * spectrum.step_hz / _ORDERS[-1]) + supply
         orders = [k for k in _ORDERS if k * supply < 0.45 * sample_rate_hz]
-        free = np.array([[_is_free(slow, known, k * f, spectrum.step_hz) for f in trials] for k in orders])
-        lines = np.stack([spectrum.at(k * trials) for k in orders]) * free
+        lines = np.stack([spectrum.at(k * trials) for k in orders])
+        free = np.array(
+            [
+                [_is_free(slow, known, k * f, spectrum.step_hz, z) for f, z in zip(trials, row, strict=True)]
+                for k, row in zip(orders, lines.tolist(), strict=True)
+            ]
+        )
+        lines *= free
         total = np.minimum(lines, _CAP).sum(axis=0)
         top = int(np.argmax(total))
         found = {
@@ -105,7 +117,7 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     if not best[2]:
         return None
     frequency, std = slow.refine(best[1], best[2])
-    free_lines = [k for k in best[2] if _is_free(slow, known, k * frequency, spectrum.step_hz)]
+    free_lines = [k for k, z in best[2].items() if _is_free(slow, known, k * frequency, spectrum.step_hz, z)]
     if not free_lines or min(abs(frequency / supply - 1) for supply in _SUPPLIES_HZ) > 1.1 * _DRIFT:
         return None
     orders = sorted({1, *best[2]})
@@ -115,17 +127,22 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     return Hum(frequency, std, amplitude)
 
 
-def _is_free(slow: SlowPart, known: MachineLines, frequency_hz: float, step_hz: float) -> bool:
-    """Whether a line is none of the machine's: far from them, or beside one that the angle tells from it."""
+def _is_free(
+    slow: SlowPart, known: MachineLines, frequency_hz: float, step_hz: float, evidence: float
+) -> bool:
+    """Whether a line is none of the machine's: far from them, or beside one that the angle tells from it.
+
+    The latter is looked at where there is a line at all: it costs a hundred times as much.
+    """
     if not known.explain(frequency_hz, step_hz):
         return True
-    return known.counted and slow.share_beyond_orders(frequency_hz) > _ONE_SINE
+    return known.counted and evidence > _HINT and slow.share_beyond_orders(frequency_hz) > _ONE_SINE
 
 
 def _alone(spectrum: LineSpectrum, frequency_hz: float, evidence: float) -> bool:
     """Whether a line is twice as high as all within some lines of it: not one of many."""
     line = round(frequency_hz / spectrum.step_hz)
-    beside = np.r_[line - _BESIDE : line - _SKIRT, line + _SKIRT + 1 : line + _BESIDE + 1]
+    beside = np.r_[line - BESIDE : line - SKIRT, line + SKIRT + 1 : line + BESIDE + 1]
     beside = beside[(beside > 0) & (beside < spectrum.evidence.size)]
     return evidence > 4 * float(spectrum.evidence[beside].max(initial=0.0))
 
@@ -149,6 +166,7 @@ class MainsInterference:
     """Hum of the supply in the measuring chain."""
 
     name = "mains_interference"
+    superposes = True
     proven = True  # its finder has a false alarm rate of its own
     parameters: tuple[Parameter, ...] = (
         Parameter("amplitude_m_s2", "m/s^2", LogNormal(0.1, 6.0, 1e-6, 1e4)),
@@ -182,7 +200,14 @@ class MainsInterference:
                 best = (found[top].frequency_std_hz, found[top])
                 shares = {name: hum.amplitude[1] / found[top].amplitude[1] for name, hum in found.items()}
         if best is None:
-            return []
+            names = context.views[0].record.channels
+            hidden = {name: hum_in_all(context, name, _SUPPLIES_HZ) for name in names}
+            hums = {name: Hum(*one) for name, one in hidden.items() if one is not None}
+            if not hums:
+                return []
+            top = max(hums, key=lambda name: hums[name].amplitude[1])
+            best = (hums[top].frequency_std_hz, hums[top])
+            shares = {name: hum.amplitude[1] / best[1].amplitude[1] for name, hum in hums.items()}
         hum = best[1]
         parts = {k: a / hum.amplitude[1] for k, a in hum.amplitude.items() if k > 1}
         start: dict[str, float | str] = {
@@ -194,6 +219,27 @@ class MainsInterference:
         start |= {f"part:{k}": part for k, part in parts.items() if part >= _SMALLEST_PART}
         start |= {f"share:{name}": share for name, share in shares.items()}
         return [start]
+
+    def seen_again(self, values: Values, heldout: Context) -> float:
+        """Log odds of that hum in other records, wherever the supply may have wandered meanwhile."""
+        parts = {1: 1.0} | {int(k[5:]): float(v) for k, v in values.items() if k.startswith("part:")}
+        amplitude, supply = float(values["amplitude_m_s2"]), float(values["frequency_hz"])
+        total = 0.0
+        for view in heldout.views:
+            shares = {n: float(values.get(f"share:{n}", 0.0)) for n in view.record.channels}
+            looks = {n: HumLines.of(view, n, supply, tuple(parts)) for n, share in shares.items() if share}
+            odds = [
+                odds_of_lines(
+                    [
+                        (amplitude * shares[n] * part, *look.sine(k, supply * (1 + drift)))
+                        for n, look in looks.items()
+                        for k, part in parts.items()
+                    ]
+                )
+                for drift in _WANDERING
+            ]
+            total += float(np.logaddexp.reduce(odds)) - math.log(len(odds))
+        return total
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """The content with hum on the channels that show it."""

@@ -32,7 +32,6 @@ _MODEL_DB = (
     2.0  # what models miss of machines in a twelfth of an octave, and seeds of planetary ones of each other
 )
 _LEAST_LINES = 3
-_FLOOR_QUANTILE = 0.25
 _MOST_GAIN_DB = 400.0
 
 
@@ -82,7 +81,6 @@ def beside(
     measured: View,
     simulated: View,
     channel: str,
-    floor: bool = False,
     per_octave: int = _PER_OCTAVE,
     noisy: View | None = None,
 ) -> Beside | None:
@@ -92,8 +90,6 @@ def beside(
     ----------
     measured, simulated : View
     channel : str
-    floor : bool
-        Levels between the lines (the lower quartile of each band, taken as that of noise) in place of means.
     per_octave : int
         Bands in an octave; with more of them the lowest band lies higher.
     noisy : View, optional
@@ -104,13 +100,13 @@ def beside(
     top = _TOP * min(measured.record.sample_rate_hz, simulated.record.sample_rate_hz)
     rates = measured.record.sample_rate_hz, simulated.record.sample_rate_hz
     model = simulated.signal(channel)
-    one = _levels(measured.signal(channel), rates[0], top, floor, per_octave)
-    other = _levels(model, rates[1], top, floor, per_octave)
+    one = _levels(measured.signal(channel), rates[0], top, per_octave)
+    other = _levels(model, rates[1], top, per_octave)
     if one is None or other is None:
         return None
     noise = None
     if noisy is not None:
-        noise = _levels(noisy.signal(channel) - model, rates[1], top, floor, per_octave)
+        noise = _levels(noisy.signal(channel) - model, rates[1], top, per_octave)
     low = max(one[0][0], other[0][0])
     grid = one[0][one[0] >= low - 1e-6]
     level, std = (np.interp(grid, one[0], row) for row in one[1:])
@@ -120,9 +116,7 @@ def beside(
     return Beside(grid, level, beside_level, spread, noise_level)
 
 
-def _levels(
-    x: Array, rate: float, top_hz: float, floor: bool, per_octave: int
-) -> tuple[Array, Array, Array] | None:
+def _levels(x: Array, rate: float, top_hz: float, per_octave: int) -> tuple[Array, Array, Array] | None:
     if not np.all(np.isfinite(x)) or np.ptp(x) == 0 or x.size < 2048:
         return None
     length = x.size // _BLOCKS
@@ -135,7 +129,7 @@ def _levels(
     centres, kernels = _bands(frequency, step, top_hz, per_octave)
     if centres.size < 8:
         return None
-    power = np.stack([_of_band(density, *kernel, floor) for kernel in kernels], axis=1)
+    power = np.stack([density[:, inside] @ weight for inside, weight in kernels], axis=1)
     power = np.maximum(power, 1e-30)
     mean = power.mean(axis=0)
     std = 4.343 * power.std(axis=0) / mean / (_BLOCKS - 1) ** 0.5
@@ -156,14 +150,6 @@ def _bands(
         inside = np.flatnonzero(weight > 0)
         kernels.append((inside, weight[inside] / weight[inside].sum()))
     return centres, kernels
-
-
-def _of_band(density: Array, inside: NDArray[np.intp], weight: Array, floor: bool) -> Array:
-    if not floor:
-        return np.asarray(density[:, inside] @ weight)
-    # The quantile of a mean of some eight periodograms: near that of a normal variable with std 1/sqrt(8).
-    quantile = np.quantile(density[:, inside], _FLOOR_QUANTILE, axis=1)
-    return np.asarray(quantile / (1 - 0.674 * _SEGMENTS**-0.5))
 
 
 def peaks_hz(data: Beside, most: int = 3) -> list[float]:
@@ -303,7 +289,6 @@ def _cost(residual: Array) -> float:
 def by_channel(
     context: Context,
     find: Callable[[Beside, float], CurveFit | None],
-    floor: bool = False,
     per_octave: int = _PER_OCTAVE,
     noisy: bool = False,
 ) -> dict[str, CurveFit]:
@@ -317,7 +302,7 @@ def by_channel(
     heard = known or [None] * len(context.views)
     for view, model, noise in zip(context.views, context.simulated_views, heard, strict=True):
         for channel in view.record.channels:
-            data = beside(view, model, channel, floor, per_octave, noise)
+            data = beside(view, model, channel, per_octave, noise)
             fit = None if data is None else find(data, view.record.sample_rate_hz)
             if fit is not None and (channel not in found or fit.drop > found[channel].drop):
                 found[channel] = fit

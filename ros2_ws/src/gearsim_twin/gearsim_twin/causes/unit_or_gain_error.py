@@ -20,7 +20,6 @@ __all__ = ["UnitOrGainError", "known_factor"]
 _LEAST_DB = 0.8  # 10 %: within that the sensitivity of a sensor in the field is known
 _DOUBTED_DB = 2.5  # of a gain that is needed for lines to agree
 _FEWEST_LINES, _FEWEST_BANDS = 4, 8
-_VAGUE_DB = 0.5
 _HIDDEN = 1.5  # where a model was tuned without it, part of a gain is in the tuning
 _SIGMAS = 4.0
 _MOST_SCATTER_DB = 6.0
@@ -65,6 +64,7 @@ class UnitOrGainError:
     """One factor on all levels of a channel, in every representation alike."""
 
     name = "unit_or_gain_error"
+    scales = True
     of_chain = True
     parameters: tuple[Parameter, ...] = (Parameter("factor", "1", LogNormal(1.0, 4.0, 1e-7, 1e7), 0.1),)
     confused_with: tuple[tuple[str, str], ...] = (
@@ -95,10 +95,10 @@ class UnitOrGainError:
         alike = all(abs(db[name] - middle) <= max(_ALIKE_DB, _SIGMAS * std[name]) for name in db)
         if alike:
             sure = abs(middle) >= max(_LEAST_DB, _SIGMAS * shared)
-            return [_start(middle, shared, "all")] if sure else self._by_lines(context)
+            return _starts(middle, "all") if sure else self._by_lines(context)
         odd = [name for name in db if abs(db[name]) >= max(_LEAST_DB, _SIGMAS * std[name])]
         odd.sort(key=lambda name: -abs(db[name]))
-        return [_start(db[name], std[name], name) for name in odd[:4]]
+        return [start for name in odd[:2] for start in _starts(db[name], name)]
 
     @staticmethod
     def _by_lines(context: Context) -> list[dict[str, float | str]]:
@@ -120,10 +120,7 @@ class UnitOrGainError:
         asked = {"all": middle} if alike else db
         worst = sorted(asked, key=lambda name: -abs(asked[name]))[:2]
         return [
-            {"factor": 10 ** (times * asked[name] / 20), "component": name}
-            for name in worst
-            if abs(asked[name]) >= _DOUBTED_DB
-            for times in (1.0, _HIDDEN)
+            start for name in worst if abs(asked[name]) >= _DOUBTED_DB for start in _starts(asked[name], name)
         ]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:
@@ -159,8 +156,6 @@ def _stands_out(context: Context, each: Difference) -> bool:
     return bool(sides[0].stands_out[k] and sides[1].stands_out[k] and np.isfinite(each.difference_db))
 
 
-def _start(gain_db: float, std_db: float, component: str) -> dict[str, float | str]:
-    """Read off, or where that is vague left to the fit."""
-    factor = 10 ** (gain_db / 20)
-    start: dict[str, float | str] = {"factor": factor, "component": component}
-    return start if std_db > _VAGUE_DB else start | {"std:factor": 0.1151 * std_db * factor}
+def _starts(gain_db: float, component: str) -> list[dict[str, float | str]]:
+    """As read beside a model whose tuning may have met it half way, and more of it."""
+    return [{"factor": 10 ** (times * gain_db / 20), "component": component} for times in (1.0, _HIDDEN)]
