@@ -63,6 +63,11 @@ class Effect:
     random: bool = False
     shrinks: bool = False
 
+    @property
+    def of_machine(self) -> bool:
+        """Whether a machine gets it in the course of time: what it was before can have been recorded."""
+        return self.enter.__module__ == machine.__name__
+
 
 CAUSES: dict[str, Effect] = {
     "shaft_speed_offset": Effect(operation.speed_offset, _GEARS, given=(0.025, 0.04, 0.07)),

@@ -42,7 +42,12 @@ class Judged:
 
 
 def judge(
-    records: Sequence[Path], rig: Rig, hidden: Sequence[Path], workers: int = 1, limit_s: float = 900.0
+    records: Sequence[Path],
+    rig: Rig,
+    hidden: Sequence[Path],
+    workers: int = 1,
+    limit_s: float = 900.0,
+    healthy: Sequence[Path] = (),
 ) -> Judged:
     """Judge records, the last of them held out.
 
@@ -57,6 +62,8 @@ def judge(
         Processes of the judge.
     limit_s : float
         After which it is stopped.
+    healthy : sequence of Path
+        Records of the machine before it had the effects.
 
     Raises
     ------
@@ -68,6 +75,8 @@ def judge(
         log.touch()
         command = [sys.executable, str(_WATCHED), "twin", *map(str, records[:-1])]
         command += ["--holdout", str(records[-1]), "--machine", rig.machine, "--model", rig.model]
+        if healthy:
+            command += ["--healthy", *map(str, healthy)]
         command += ["--workers", str(workers), "--report", str(folder / "report"), "--json"]
         began, before = time.monotonic(), _children_s()
         out, err, code = _run(command, folder, environment(log), limit_s)

@@ -32,12 +32,16 @@ def run(plan: Planned, workers: int, cache: Path | None, limit_s: float) -> dict
         began = time.process_time()
         places, truth, secret = _records(plan, folder)
         result |= {"truth": truth, "made_s": round(time.process_time() - began, 1)}
-        judged = judge(places, RIGS[plan.rig], [secret], workers, limit_s)
+        before = sorted(folder.glob("before_*"))
+        judged = judge(places, RIGS[plan.rig], [secret], workers, limit_s, before)
         result |= {"wall_s": round(judged.wall_s, 1), "cpu_s": round(judged.cpu_s, 1)}
         if judged.verdict is None:
             return {**result, "failed": judged.said}
         result["score"] = score(truth, plan.kind, judged.verdict)
         result["verdict"] = judged.verdict
+        if before and plan.compared:
+            alone = judge(places, RIGS[plan.rig], [secret], workers, limit_s)
+            result["without_healthy"] = score(truth, plan.kind, alone.verdict) if alone.verdict else None
         result["detector"] = {"largest_db": largest_db(places, RIGS[plan.rig])}
     return result
 
@@ -52,7 +56,7 @@ def _records(plan: Planned, folder: Path) -> tuple[list[Path], dict[str, Any], P
     done = sorted(folder.parent.glob(f".{folder.name}-*/truth.json")) if folder.exists() else []
     if done:
         return sorted(folder.glob("run_*")), json.loads(done[0].read_text(encoding="utf-8")), done[0].parent
-    made = make(*drawn(plan.rig, plan.effects, (plan.seed, plan.index)))
+    made = make(*drawn(plan.rig, plan.effects, (plan.seed, plan.index)), healthy=plan.healthy)
     folder.mkdir(parents=True, exist_ok=True)
     places = write(made, folder)
     secret = folder.parent / f".{folder.name}-{secrets.token_hex(8)}"

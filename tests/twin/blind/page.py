@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,8 @@ def page(results: Sequence[Result], when: str, command: str) -> str:
     command : str
         That makes them anew.
     """
-    parts = [_head(results, when, command), _goals(results), _baselines(results), _severities(results)]
+    parts = [_head(results, when, command), _goals(results), _baselines(results), _before(results)]
+    parts = [part for part in [*parts, _severities(results)] if part]
     return "\n\n".join([*parts, _confusion(results), _coverage(results), _lost(results)]).rstrip() + "\n"
 
 
@@ -65,6 +66,8 @@ at any size (a pit wider than what a ball bridges), that is enough; what stays b
 shapes the vibration of the bearing rig (gains, roll-off, resonances of sensor and casing) is measured with
 quiet sensors (10 ug/sqrt(Hz)), its spalls in a loud hall. Of a noise floor the judge cannot know how high it
 should be: those hidden differ by their colour.
+Of machines with gears the judge gets one or two records from before (`--healthy`: other runs of the same
+machine and sensors, without effects), where an effect is of the machine, and where there is none.
 Shares are given with Wilson's interval of 95 %. A case that ends without a verdict counts as wrong."""
 
 
@@ -159,6 +162,34 @@ def _baselines(results: Sequence[Result]) -> str:
             f"| share of the held-out gap closed, median | {middle(extended)} | {middle(tuned)} | - |",
         ]
     )
+
+
+def _before(results: Sequence[Result]) -> str:
+    """What records from before are worth: cases that were judged with and without them."""
+    both = [one for one in judged(results) if one.get("without_healthy")]
+    if not both:
+        return ""
+    alone = [{**one, "score": one["without_healthy"]} for one in both]
+    lines = [
+        "## With and without records of the healthy machine",
+        "",
+        f"{len(both)} cases, every third of those that have such records, were judged without them as well.",
+        "",
+        "| | with | without |",
+        "|---|---|---|",
+    ]
+    rows: list[tuple[str, str, Callable[[Result], bool]]] = [
+        ("single effect: named first", "single", right("strict")),
+        ("two effects: both among the causes", "pair", right("strict")),
+        ("none: false causes", "none", lambda one: bool(one["score"]["causes"])),
+    ]
+    for name, kind, counted in rows:
+        sides = [share(of_kind(each, kind), counted) for each in (both, alone)]
+        lines.append(f"| {name} | {sides[0]} | {sides[1]} |")
+    gaps = [closed(each) for each in (both, alone)]
+    middle = [f"{np.median(gap):.2f}" if gap.size else "-" for gap in gaps]
+    lines.append(f"| share of the gap closed, median | {middle[0]} | {middle[1]} |")
+    return "\n".join(lines)
 
 
 def _severities(results: Sequence[Result]) -> str:

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from blind.effects import CAUSES, OUTSIDE, SEVERITIES, noise_of, size_of
+from blind.effects import CAUSES, EFFECTS, OUTSIDE, SEVERITIES, noise_of, size_of
 from blind.making import Hidden
 from blind.sizing import OutOfReachError, plain_data, size_for
 
@@ -18,6 +18,9 @@ _PATTERN = (
     "single", "outside", "single", "single", "none", "single", "outside", "single", "pair", "single",
 )  # fmt: skip
 _RIGS = ("parallel", "planetary", "bearing")
+_GEARED = ("parallel", "planetary")
+# Of the cases with records from before, every third by number is judged without them as well.
+_COMPARED = 3
 # Machines of a case that are tried until one shows its effects as they should show.
 _MACHINES = 8
 # Sensors of cases without any effect: as they are with effects.
@@ -38,6 +41,11 @@ class Planned:
         Names and severities.
     only : str
         The rig that all cases of the run are of; "" for all rigs.
+
+    Notes
+    -----
+    Of machines with gears there are one or two records from before, where an effect is of the machine, and
+    where there is none: so they tell nothing by being there. Some of these cases are judged without as well.
     """
 
     seed: int
@@ -51,6 +59,18 @@ class Planned:
     def severity(self) -> str:
         """Of its effects; "" of none."""
         return self.effects[0][1] if self.effects else ""
+
+    @property
+    def healthy(self) -> int:
+        """How many records there are from before."""
+        geared = self.rig in _GEARED and self.kind in ("single", "pair", "none")
+        known = not self.effects or any(EFFECTS[name].of_machine for name, _ in self.effects)
+        return 1 + self.index % 2 if geared and known else 0
+
+    @property
+    def compared(self) -> bool:
+        """Whether it is judged without these as well."""
+        return self.index % _COMPARED == 0
 
 
 @cache

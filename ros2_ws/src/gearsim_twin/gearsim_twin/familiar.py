@@ -8,7 +8,8 @@ so that teeth wrong at random, resonances and paths are those of the machine, an
 the model's word. What superposes itself on a line does so at an angle that is not known: of an addition
 of the power B^2 the model, whose own line stands at another angle, shows D = B^2 + 2 A B cos(phi). Then
 B^2 = D^2 / (|D| + 2 P_m), right for D far above P_m and in the mean over angles far below, is added, and
-the level is known to 10 / ln(10) sqrt(2 P_h B^2) / P only. Shapes of a band of power P add as cumulants:
+the level is known to 10 / ln(10) sqrt(2 (P_h + P_m) B^2) / P only. Shapes of a band with the power P add as
+cumulants:
 
     (X - X_Gauss) P^2     squared envelope spectra, coherence, kurtosis, scatter
     (X - X_Gauss) P       peaks of the squared signal
@@ -40,6 +41,7 @@ _OF_IMPACTS, _IMPACT_DB = ("decay", "centre", "spacing"), 3.0
 # Least share of a shape that cumulants may leave; what would be less is taken as a ratio.
 _LEAST_LEFT = 0.05
 _MOST_DB = 60.0
+_BESIDE = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +120,7 @@ class _Rows:
     of_impacts: NDArray[np.bool_]
     order: Array
     of_band: NDArray[np.intp]
+    run: NDArray[np.intp]
     scale: Array
 
     @classmethod
@@ -132,6 +135,7 @@ class _Rows:
             of_impacts=np.array([p.domain == "transient" and p.kind in _OF_IMPACTS for p in places]),
             order=np.array([1.0 if p.kind in _FIRST_ORDER else 2.0 for p in places]),
             of_band=of_band,
+            run=np.unique([f"{p.domain} {p.channel}" for p in places], return_inverse=True)[1],
             scale=np.array([6.0 / p.width if p.kind == "ratio" else 1.0 for p in places]),
         )
 
@@ -146,12 +150,26 @@ class _Rows:
         with np.errstate(divide="ignore", invalid="ignore"):
             more = np.where(angled, d**2 / (np.abs(d) + 2.0 * q), d)
             total = np.where(self.power & (angled | (d > 0)), p + more, _power(level))
-            scatter = np.where(angled, _DB * np.sqrt(2.0 * p * np.maximum(more, 0.0)) / total, 0.0)
+            # An angle at which a line hides what is added to it tells its neighbours, not the line.
+            most = np.maximum(more, self.beside(more))
+            scatter = np.where(angled, _DB * np.sqrt(2.0 * (p + q) * np.maximum(most, 0.0)) / total, 0.0)
             level = np.where(self.power, 10 * np.log10(total), level)
         level = self._shapes(h, bare, added, level)
         share = np.minimum(np.abs(change) / _IMPACT_DB, 1.0)
         mixed = (1 - share) * h.level_db + share * added.level_db
         return np.where(self.of_impacts, mixed, level), np.nan_to_num(scatter)
+
+    def beside(self, power: Array) -> Array:
+        """Of each line the median over itself and two neighbours to either side, along each channel."""
+        out = np.zeros(power.size)
+        for run in np.unique(self.run[self.line]):
+            rows = np.flatnonzero(self.line & (self.run == run))
+            values = np.pad(
+                np.nan_to_num(power[rows]), _BESIDE, mode="reflect" if rows.size > _BESIDE else "edge"
+            )
+            windows = np.lib.stride_tricks.sliding_window_view(values, 2 * _BESIDE + 1)
+            out[rows] = np.median(windows, axis=1)
+        return out
 
     def _shapes(self, h: Levels, bare: Levels, added: Levels, level: Array) -> Array:
         """The same for shapes of bands, by cumulants; `level` has powers of bands and ratios of the rest."""

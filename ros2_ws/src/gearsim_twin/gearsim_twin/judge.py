@@ -123,7 +123,7 @@ class Bench:
             nominal=tuple(self.nominal[k] for k in numbers),
             training=tuple(range(training)),
             run=run,
-            nuisances=measuring_chain(plan, self.case.levels_known),
+            nuisances=measuring_chain(plan, self.case.levels_known, taught is not None),
             chance=self.chance(numbers, training, plan),
             numbers=numbers,
             taught=taught,
@@ -182,6 +182,14 @@ class Bench:
         (shown,) = bench.trials([trial.model], bench.holdout)
         return self.context(bench, prior, shown, bench.holdout)
 
+    def _before(self, bench: Workbench, trial: Trial, records: Sequence[int]) -> tuple[View, ...]:
+        """For each record the healthy one of the most similar conditions; none once the model has causes."""
+        if trial.model.extensions or not all(bench.familiar(k) for k in records):
+            return ()
+        assert bench.taught is not None  # as they are familiar
+        nearest = [bench.taught.near(bench.conditions[k])[0] for k in records]
+        return tuple(self.views[self.healthy[k]] for k in nearest)
+
     @staticmethod
     def chain(bench: Workbench, trial: Trial) -> Nuisance:
         """The whole measuring chain behind a trial's simulations."""
@@ -216,6 +224,7 @@ class Bench:
             more_contents=tuple(trial.model.content(self.nominal[k]) for k in more),
             noisy_views=tuple(heard(view, chain, self.settings.seed + k) for k, view in enumerate(plain)),
             gains_db=chain.gains_db,
+            healthy_views=self._before(bench, trial, records),
         )
 
 

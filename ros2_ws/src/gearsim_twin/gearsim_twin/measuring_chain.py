@@ -23,7 +23,9 @@ __all__ = ["MeasuringChain", "measuring_chain"]
 # A calibrated accelerometer on a stud is right to a tenth or so; its converter's filter is flat in the band
 # compared; noise of sensors may rise as 1/f.
 GAIN_STD_DB, TOP_STD_DB, COLOUR_STD_DB = 1.0, 1.0, 6.0
-_UNKNOWN_GAIN_DB = 10.0
+# Of a sensor that may have been taken off and put on again in the meantime.
+_SAME_GAIN_DB = 0.5
+_UNKNOWN_GAIN_DB = 30.0
 _FEWEST_BANDS, _NOISY_DB = 4, 3.0
 _MOST_DB = 60.0
 _STIFF_DB = 0.1
@@ -103,10 +105,14 @@ class MeasuringChain:
         return nuisance[1]
 
 
-def measuring_chain(plan: Plan, levels_known: bool) -> MeasuringChain:
-    """The chain of the channels of a plan; gains are free where the unit of the records is not known."""
+def measuring_chain(plan: Plan, levels_known: bool, as_before: bool = False) -> MeasuringChain:
+    """The chain of the channels of a plan.
+
+    Gains are free where the unit of the records is not known. `as_before` is for sensors that have measured the
+    healthy machine as well.
+    """
     channels = plan.frame.channels
-    gain = GAIN_STD_DB if levels_known else _UNKNOWN_GAIN_DB
+    gain = (_SAME_GAIN_DB if as_before else GAIN_STD_DB) if levels_known else _UNKNOWN_GAIN_DB
     assumed = tuple(
         Assumed(channel, kind, std)
         for channel in channels

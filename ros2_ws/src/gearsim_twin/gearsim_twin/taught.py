@@ -35,8 +35,8 @@ REPEAT_DB = {
     "transient": 0.4,
     "tones": 0.8,
 }
-"""What runs of one machine differ by beyond sampling, where no line is beside a place: three runs of each of
-five sound machines of the blind tests' rigs (speed and load within 0.3 %) differed by 0 to 0.8 times as much."""
+"""What runs of one machine differ by beyond sampling, where no line is beside a place: three runs of
+each of five sound machines of the blind tests' rigs (speed and load within 0.3 %) differed by 0 to 0.8 times that."""
 # Of what the model says that other conditions do, so much is not believed.
 _DOUBT = 0.5
 # Differences among healthy records that are as much as the assumption.
@@ -71,8 +71,9 @@ class Taught:
         return len(self.measured) > 1
 
     def near(self, here: Conditions) -> list[int]:
-        """Healthy records under much the same conditions."""
-        return [k for k, own in enumerate(self.conditions) if apart(own, here) < NEAR]
+        """Healthy records under much the same conditions, the most similar first."""
+        distance = [apart(own, here) for own in self.conditions]
+        return sorted((k for k, own in enumerate(distance) if own < NEAR), key=lambda k: distance[k])
 
     def familiar(self, bare: Features, here: Conditions) -> Familiar | None:
         """The healthy machine under the conditions of a record; None where no healthy record is near.

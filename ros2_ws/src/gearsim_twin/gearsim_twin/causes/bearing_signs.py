@@ -7,7 +7,7 @@ shows can be told from what it lacks.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -33,6 +33,7 @@ __all__ = ["Sign", "signs_of", "size_of", "unexplained_signs"]
 _WINDOW_S, _LEAST_TURNS, _HOPS = 2.0, 20.0, 2
 # A spall may modulate less than what the diagnosis calls a fault: a first guess is a question, no alarm.
 _LEAST_MODULATION, _LEAST_DOMINANCE = 0.03, 1.1
+_NEXT_TO_NOTHING = 0.01
 _AS_STRONG = 0.5  # of the measured modulation: a model that shows so much has the fault already
 _SAME_ORDER = 0.05  # families are further apart
 _RIVAL_SHARE = 0.25
@@ -68,6 +69,8 @@ class Sign:
         For the size.
     elements : int
         Rolling elements with which the lines make sense: the nameplate's, or another number.
+    run : (int, int) or None
+        Of lines in the spectrum itself, the first of the harmonics that stand out and their number.
     """
 
     component: str
@@ -80,11 +83,17 @@ class Sign:
     channel: str
     finding: Finding
     elements: int
+    run: tuple[int, int] | None = None
 
     @property
     def weight(self) -> float:
         """By which signs are ranked: modulation by the bearing's share."""
         return self.modulation * self.share
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether the diagnosis would tell them as a fault."""
+        return self.finding.confidence > 0.0
 
 
 _FOUND: WeakKeyDictionary[View, tuple[Sign, ...]] = WeakKeyDictionary()
@@ -112,9 +121,14 @@ def unexplained_signs(context: Context, fault: str, *, absent: bool = False) -> 
     best: dict[str, tuple[int, Sign]] = {}
     model = context.simulated_views if absent else context.noisy_views or context.simulated_views
     for record, (measured, simulated) in enumerate(zip(context.views, model, strict=True)):
-        present = [sign for sign in signs_of(simulated) if sign.fault == fault]
+        before = context.healthy_views[record : record + 1]
+        present = [sign for view in before for sign in signs_of(view) if sign.fault == fault]
+        shown = [sign for sign in signs_of(simulated) if sign.fault == fault]
         for sign in signs_of(measured):
-            if sign.fault != fault or any(_explains(one, sign) for one in present):
+            quiet = absent and _is_quiet(simulated, measured, sign, context.gains_db)
+            if sign.fault != fault or any(
+                _explains(one, sign) for one in (*present, *(() if quiet else shown))
+            ):
                 continue
             known = best.get(sign.component)
             if known is None or known[1].weight < sign.weight:
@@ -141,6 +155,28 @@ def _sized(view: View, sign: Sign) -> Sizing | None:
         )
     except InputError:  # not finite, too short, or sampled too slowly
         return None
+
+
+def _is_quiet(model: View, measured: View, sign: Sign, gains_db: Mapping[str, float]) -> bool:
+    """Whether the model gives next to nothing in the band in which a record has these lines.
+
+    A sound bearing gives lines of its passages too, a hundred decibels down: without noise they modulate what
+    little there is as deeply as a spall.
+    """
+    band = sign.finding.evidence.get("band_hz")
+    if not isinstance(band, list) or sign.channel not in model.record.channels:
+        return False
+    own, other = (_band_power(view, sign.channel, band[0], band[1]) for view in (model, measured))
+    return own * 10.0 ** (0.1 * gains_db.get(sign.channel, 0.0)) < _NEXT_TO_NOTHING * other
+
+
+def _band_power(view: View, channel: str, low_hz: float, high_hz: float) -> float:
+    """Mean square of a channel in a band."""
+    signal = view.signal(channel)
+    lines = np.fft.rfft(signal)
+    hz = np.fft.rfftfreq(signal.size, 1.0 / view.record.sample_rate_hz)
+    inside = lines[(hz >= low_hz) & (hz < high_hz)]
+    return float(2.0 * np.sum(inside.real**2 + inside.imag**2)) / signal.size**2
 
 
 def _explains(model: Sign, measured: Sign) -> bool:

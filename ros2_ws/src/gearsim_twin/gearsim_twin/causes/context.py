@@ -49,6 +49,9 @@ class Context:
     more_views, more_contents
         Further records under the same conditions, not simulated, and the model under these: for what is read
         off records alone.
+    healthy_views : tuple of View
+        For each record one of the healthy machine under much the same conditions; no cause shows in it.
+        Empty where there are none, and once the model has causes.
     gains_db : mapping of str to float
         By channel, the gain of the measuring chain that `simulated` has been given.
     """
@@ -64,6 +67,7 @@ class Context:
     more_views: tuple[View, ...] = ()
     more_contents: tuple[Content, ...] = ()
     gains_db: Mapping[str, float] = field(default_factory=dict)
+    healthy_views: tuple[View, ...] = ()
 
     def differences(
         self, domain: str, channel: str | None = None, kind: str | None = None

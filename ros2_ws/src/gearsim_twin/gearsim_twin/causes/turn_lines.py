@@ -37,6 +37,8 @@ _FLOOR_LINES = 15
 # What fitted models still miss of lines that they have: a fifth; errors of planetary gears are drawn anew
 # with every seed, so that such a line may have any phase.
 _MODEL, _DRAWN = 0.2, 1.0
+# What lines of one machine differ by from run to run, of speeds and loads that differ by some 0.3 %.
+_REPEATED = 0.1
 _SMOOTH_LINES = 9
 # Between planets, whose errors are drawn anew, nothing but marks tells where a carrier stands.
 _MARKED = ("tacho", "encoder")
@@ -171,6 +173,10 @@ def _deviation(context: Context, record: int, turns: float) -> Deviation | None:
     simulated = turn_lines(model, turns, lines, channels)
     if measured is None or simulated is None:
         return None
+    if context.healthy_views:
+        healthy = turn_lines(context.healthy_views[record], turns, lines, channels)
+        if healthy is not None:
+            return _beyond_healthy(context, record, turns, measured, healthy, simulated)
     own = measured.values
     if not context.case.levels_known:
         own = own * (_rms(simulated.values) / np.maximum(_rms(own), 1e-300))
@@ -188,6 +194,23 @@ def _deviation(context: Context, record: int, turns: float) -> Deviation | None:
     return Deviation(
         record, turns, values, np.abs(own) ** 2 - square, variance, None if drawn else simulated.values
     )
+
+
+def _beyond_healthy(
+    context: Context, record: int, turns: float, measured: Lines, healthy: Lines, simulated: Lines
+) -> Deviation:
+    """What a record has beyond one of the same machine when it was healthy, turned to where the model stands.
+
+    The teeth are the same, whatever they are wrong by: both records are laid over each other first.
+    """
+    own = measured.values * _best_turn(measured.values, healthy.values)
+    variance = measured.variance + healthy.variance + (_REPEATED * np.abs(healthy.values)) ** 2
+    variance += 1e-10 * np.max(np.abs(healthy.values) ** 2, axis=1, keepdims=True) + 1e-30
+    power = np.abs(own) ** 2 - np.abs(healthy.values) ** 2
+    if has_planets(context.contents[record]):
+        return Deviation(record, turns, own - healthy.values, power, variance, None)
+    turned = _best_turn(healthy.values, simulated.values)
+    return Deviation(record, turns, (own - healthy.values) * turned, power, variance, simulated.values)
 
 
 def _rms(values: Complex) -> Array:

@@ -31,6 +31,8 @@ _KNOT_SPREAD_DB, _KNOT_REACH_DB = 6.0, 60.0
 # Where no floor is needed none should be left: a pull too weak to move one that is.
 _KNOT_DEPTH_DB = 40.0
 _FEWEST_PLACES = 4
+_LEAST_REPEAT_DB, _HALF = 0.3, 0.5
+_SELDOM, _APART_DB = 0.15, 1.0
 _LEAST_CORNER, _USUAL_CORNER, _CORNER_SPREAD = math.log(0.05), math.log(4.0), 2.0
 _CORNER_STARTS = (_USUAL_CORNER, math.log(0.5))
 
@@ -124,6 +126,7 @@ class _Levels:
     width: Vector
     is_band: NDArray[np.bool_]
     turning: frozenset[str]
+    own: Vector
 
     @classmethod
     def of(cls, pairs: Sequence[tuple[Features, Features]]) -> _Levels:
@@ -132,23 +135,26 @@ class _Levels:
         quiet = np.array([place.kind in ("band", "floor") for place in places], dtype=np.bool_)
         channel = np.array([place.channel for place in places])
         tau = np.where(quiet, _BAND_TAU_DB, _LINE_TAU_DB)
-        parts: list[tuple[NDArray[np.intp], Vector, Vector, Vector, Vector, Vector]] = []
+        parts: list[tuple[NDArray[np.intp], Vector, Vector, Vector, Vector, Vector, Vector]] = []
         for measured, simulated in pairs:
             m, s = measured.levels, simulated.levels
             use = fitted & (measured.stands_out | simulated.stands_out)
             use &= np.isfinite(m.level_db) & np.isfinite(s.level_db) & np.isfinite(m.frequency_hz)
             rows = np.flatnonzero(use)
-            sigma = np.sqrt(m.std_db[rows] ** 2 + s.std_db[rows] ** 2 + tau[rows] ** 2)
+            # Sharper than so a loss that forgives would let no start find its way.
+            repeat = np.maximum(s.repeat_db[rows], _LEAST_REPEAT_DB) * (1 - s.own[rows])
+            missed2 = (tau[rows] * s.own[rows]) ** 2 + repeat**2
+            sigma = np.sqrt(m.std_db[rows] ** 2 + s.std_db[rows] ** 2 + missed2)
             power = 10 ** (0.1 * s.level_db[rows])
             hz, width = m.frequency_hz[rows], m.bandwidth_hz[rows]
-            parts.append((rows, m.level_db[rows], power, 1 / sigma, hz, width))
+            parts.append((rows, m.level_db[rows], power, 1 / sigma, hz, width, s.own[rows]))
         index = np.concatenate([part[0] for part in parts])
-        level, power, weight, hz, width = (
-            np.concatenate([np.asarray(part[k], dtype=np.float64) for part in parts]) for k in range(1, 6)
+        level, power, weight, hz, width, own = (
+            np.concatenate([np.asarray(part[k], dtype=np.float64) for part in parts]) for k in range(1, 7)
         )
         others = {place.channel for place in places if place.domain != "torsional"}
         turning = frozenset(place.channel for place in places) - others
-        return cls(channel[index], level, power, weight, hz, width, quiet[index], turning)
+        return cls(channel[index], level, power, weight, hz, width, quiet[index], turning, own)
 
     @property
     def channels(self) -> list[str]:
@@ -169,6 +175,7 @@ class _Levels:
             self.width[mine],
             self.is_band[mine],
             self.turning,
+            self.own[mine],
         )
         gain_std = 0.0 if channel in self.turning else limits.gain_std_db
         bands = part.hz[part.is_band]
@@ -185,14 +192,22 @@ class _Levels:
         return found
 
     def first_gains(self, gain_std_db: float) -> list[float]:
-        """None, and the usual ratio of lines."""
+        """None, the usual ratio of lines, and the one at which the model is hardly ever too loud.
+
+        Noise fills what a model lacks and takes nothing away: with a gain of any size, a fit that starts too
+        loud may stay there.
+        """
         if gain_std_db == 0:
             return [0.0]
         lines = ~self.is_band
         use = lines if lines.sum() >= _FEWEST_PLACES else np.ones_like(lines)
-        ratio = self.measured_db[use] - 10 * np.log10(np.maximum(self.simulated[use], _TINY))
-        guess = float(np.clip(np.median(ratio), -4 * gain_std_db, 4 * gain_std_db))
-        return [0.0, guess] if abs(guess) > 1.0 else [0.0]
+        ratio = self.measured_db - 10 * np.log10(np.maximum(self.simulated, _TINY))
+        guesses = [float(np.median(ratio[use])), float(np.quantile(ratio, _SELDOM))]
+        found = [0.0]
+        for guess in np.clip(guesses, -4 * gain_std_db, 4 * gain_std_db).tolist():
+            if all(abs(guess - other) > _APART_DB for other in found):
+                found.append(guess)
+        return found
 
     def first_floor(self, gain_db: float, knots_hz: Vector) -> tuple[Vector, Vector]:
         """Lowest and first value of the knots: what the measured bands near them hold more than the model."""
@@ -205,6 +220,8 @@ class _Levels:
         for part in np.array_split(np.arange(order.size), knots_hz.size):
             quiet = float(np.quantile(measured[part], 0.3)) if part.size else float(measured.min())
             below = bool(part.size) and float(np.median(model[part])) < quiet - 1.0
+            # What the healthy machine showed has the noise of the sensors already.
+            below &= float(np.median(self.own)) > _HALF
             first.append(quiet if below else quiet - 20.0)
         floor = np.array(first)
         return np.full(floor.size, float(floor.min()) - _KNOT_REACH_DB), floor
@@ -244,8 +261,8 @@ class _Levels:
 
 
 def _is_fitted(place: Place) -> bool:
-    """Bands and lines; tones are no business of the chain."""
-    return place.domain in ("psd", "orders", "torsional") and place.kind != "tone"
+    """Bands and lines; tones and passages are no business of the chain."""
+    return place.domain in ("psd", "orders", "torsional") and place.kind not in ("tone", "passage")
 
 
 def _knot_weights(hz: Vector, knots_hz: Vector) -> Vector:
