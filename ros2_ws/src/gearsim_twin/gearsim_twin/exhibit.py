@@ -16,13 +16,14 @@ from gearsim_twin.calibrate import SMOOTH_DB
 from gearsim_twin.compare.chains import Nuisance
 from gearsim_twin.compare.discrepancy import Comparison, compare, pooled
 from gearsim_twin.compare.places import Place
+from gearsim_twin.model import Model
 from gearsim_twin.score import DomainScore, Scores, score_models
+from gearsim_twin.tuning import tuning_of
 from gearsim_twin.view import View
 
 if TYPE_CHECKING:
     from gearsim_twin.compare.features import Features
     from gearsim_twin.judge import Bench
-    from gearsim_twin.model import Model
     from gearsim_twin.select import Selection
     from gearsim_twin.workbench import Trial, Workbench
 
@@ -127,9 +128,11 @@ def exhibit_of(bench: Bench, work: Workbench, selection: Selection, seed: int) -
         Of intervals and of the sensors' noise.
     """
     final = selection.final.trial.model
-    models = [replace(final, knobs=(0.0,) * len(final.knobs), extensions=()), selection.tuned.trial.model]
+    described = tuning_of(bench.case.machine_path, bench.case.model)
+    records = (*work.training, *work.holdout)
+    models = [Model(described, described.nominal), selection.tuned.trial.model]
     models += [replace(final, extensions=final.extensions[: k + 1]) for k in range(len(final.extensions))]
-    trials = work.trials(models, (*work.training, *work.holdout))
+    trials = work.by_models_alone().trials(models[:1], records) + work.trials(models[1:], records)
     names = [
         (BASELINE, ""),
         (TUNED, ""),
@@ -158,7 +161,7 @@ def exhibit_of(bench: Bench, work: Workbench, selection: Selection, seed: int) -
         scores=score_models(measured, sides, seed),
         bands=_bands(bench, measured, sides, seed),
         measured=bench.views[work.holdout[0]],
-        sides=_sides(bench, work.holdout[0], models, trials, seed),
+        sides=_sides(bench, work, models, trials, seed),
     )
 
 
@@ -214,15 +217,17 @@ def _inside(place: Place, band_hz: tuple[float, float], speed_hz: float) -> bool
 
 
 def _sides(
-    bench: Bench, record: int, models: Sequence[Model], trials: Sequence[Trial], seed: int
+    bench: Bench, work: Workbench, models: Sequence[Model], trials: Sequence[Trial], seed: int
 ) -> dict[str, View]:
-    """Baseline and extended model in place of a record."""
+    """Baseline and extended model in place of the first held-out record."""
+    record = work.holdout[0]
+    benches = (work.by_models_alone(), work)
     ends = {BASELINE: 0, "extended": len(models) - 1}
     jobs = [(record, models[k].content(bench.nominal[record])) for k in ends.values()]
     views = bench.simulator.derived(jobs, _itself, bench.seconds, bench.settings.seed)
     return {
-        name: through_chain(view, trials[k].nuisance[0], seed)
-        for (name, k), view in zip(ends.items(), views, strict=True)
+        name: through_chain(view, bench.chain(each, trials[k]), seed)
+        for (name, k), view, each in zip(ends.items(), views, benches, strict=True)
     }
 
 

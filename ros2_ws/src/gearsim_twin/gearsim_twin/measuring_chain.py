@@ -108,8 +108,8 @@ class MeasuringChain:
 def measuring_chain(plan: Plan, levels_known: bool, as_before: bool = False) -> MeasuringChain:
     """The chain of the channels of a plan.
 
-    Gains are free where the unit of the records is not known. `as_before` is for sensors that have measured the
-    healthy machine as well.
+    Gains are free where the unit of the records is not known. `as_before` is for sensors that have measured
+    the healthy machine as well.
     """
     channels = plan.frame.channels
     gain = (_SAME_GAIN_DB if as_before else GAIN_STD_DB) if levels_known else _UNKNOWN_GAIN_DB

@@ -36,7 +36,7 @@ REPEAT_DB = {
     "tones": 0.8,
 }
 """What runs of one machine differ by beyond sampling, where no line is beside a place: three runs of
-each of five sound machines of the blind tests' rigs (speed and load within 0.3 %) differed by 0 to 0.8 times that."""
+each of five sound machines of the blind tests (speed and load within 0.3 %) differed by 0 to 0.8 times that."""
 # Of what the model says that other conditions do, so much is not believed.
 _DOUBT = 0.5
 # Differences among healthy records that are as much as the assumption.
