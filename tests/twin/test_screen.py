@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from toy_rig import SIZE, TUNING, ToyCause, context_of, effect, toy_case, yard_of
 
+from gearsim_twin.causes.cause import Parameter
 from gearsim_twin.causes.edit import with_entry
+from gearsim_twin.causes.prior import Normal
 from gearsim_twin.fit import fit_tuning
 from gearsim_twin.model import Extension, Model
 from gearsim_twin.screen import screen
@@ -43,6 +45,14 @@ def test_a_guess_that_shows_too_much_is_tried_smaller():
     assert sized.nats > plain.nats + 5.0
     assert sized.plain_nats > 0.0
     assert sized.plain_nats == pytest.approx(sized.nats, abs=3.0)
+
+
+def test_a_size_that_may_have_either_sign_is_tried_nearer_to_zero():
+    signed = Parameter("size", "1", Normal(0.0, 8.0), step=0.1)
+    found = _screened(SizedPit("outer", (signed,), None))
+    # Half a standard deviation less would be zero, and more of it the opposite of what was seen.
+    assert 0.3 < found.extension.values["size"] < 1.7
+    assert found.plain_nats > 0.0
 
 
 def test_the_search_for_a_size_costs_three_simulations_of_a_record():

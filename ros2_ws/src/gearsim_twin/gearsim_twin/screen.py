@@ -28,6 +28,7 @@ _STRENGTHS = 2.0 ** np.arange(-5, 6)
 # Of a guess that would do better at less strength, the size is sought: events of a size that is much too
 # great are of another shape, and no scaling of what they add makes them those of a small one.
 _SMALLER = (-0.7, -1.4, -2.1)
+_PARTS = (1.0, 0.4, 0.15)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,11 +148,21 @@ def _smaller(screened: list[Screened]) -> list[tuple[Extension, int]]:
         size = getattr(each.extension.cause, "size", "")
         if each.strength < 1.0 and size in names:
             k = names.index(size)
-            for step in _SMALLER:
+            for coordinate in _less(each, k):
                 at = list(each.extension.coordinates)
-                at[k] += step
+                at[k] = coordinate
                 found.append((each.extension.at(tuple(at)), each.guesses))
     return found
+
+
+def _less(each: Screened, number: int) -> list[float]:
+    """Coordinates of smaller sizes; those of a signed one go towards zero, power being its square."""
+    prior = each.extension.free[number].prior
+    here = each.extension.coordinates[number]
+    if prior.low >= 0.0:
+        return [here + step for step in _SMALLER]
+    best = prior.value(here) * each.strength**0.5
+    return [prior.coordinate(part * best) for part in _PARTS]
 
 
 def _values(yard: Yardstick, base: Fitted, trial: Trial) -> tuple[float, float, float]:

@@ -25,6 +25,7 @@ class ToothPitchError:
     """The transmission error of one tooth, handed over by its share of the load."""
 
     name = "tooth_pitch_error"
+    size = "error_m"
     superposes = True
     parameters: tuple[Parameter, ...] = (
         Parameter("error_m", "m", Normal(0.0, 2e-5, -1e-3, 1e-3), step=1e-6),
