@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from gearsim_dsp.judges.bearing import ALARM_PROBABILITY
 from gearsim_twin.causes.bearing_model import alike, bearings_of, has_defect, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, size_of, unexplained_signs
 from gearsim_twin.causes.cause import REPEATED_NATS, Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
+from gearsim_twin.causes.passage_signs import passage_signs, shown_again
 from gearsim_twin.causes.prior import LogNormal
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
 
 __all__ = [
+    "FAULT_NATS",
     "SPALL_WIDTH",
     "RaceSpall",
     "candidates",
+    "damaged",
     "has_bearings",
     "known_width_m",
     "seen_again",
@@ -34,6 +38,9 @@ _GUESSES = (0.05, 0.12, 0.27)
 _MOST_STARTS = 4
 _ROOM = 0.98
 _NEARLY = 0.5
+FAULT_NATS = min(-2.0 * math.log(ALARM_PROBABILITY), 15.0)
+"""For lines that the diagnosis calls a fault in records for training and in those held out: its false alarms
+are independent there, but a machine beside may show such lines once in some millions of cases."""
 _ALIKE = 0.01  # slip changes from load to load by less
 _FAR_LOG = 0.5  # a width by events that is further from the usual one has that as a second guess
 
@@ -45,30 +52,48 @@ def has_bearings(context: Context) -> bool:
 
 
 def candidates(context: Context, fault: str, *, absent: bool = False) -> list[tuple[int, Sign]]:
-    """Unexplained signs of bearings that the model has, where no defect of it gives these lines already."""
+    """Unexplained signs of bearings that the model has, where no defect of it gives these lines already.
+
+    Those of the spectrum itself count where the envelope shows none of that kind.
+    """
     content, machine = context.contents[0], context.case.machine
     known = bearings_of(content)
+    found = unexplained_signs(context, fault, absent=absent)
+    heard = {name for _, sign in found for name in alike(machine, sign.component)}
+    found += [e for e in passage_signs(context, fault, absent=absent) if e[1].component not in heard]
     return [
         (record, sign)
-        for record, sign in unexplained_signs(context, fault, absent=absent)
+        for record, sign in found
         if sign.component in known and not has_defect(content, alike(machine, sign.component), fault)
     ]
 
 
 def seen_again(component: str, fault: str, context: Context, heldout: Context) -> float:
-    """Nats for lines that the model lacks in the records for training and, alike, in those held out."""
-    orders = []
+    """Nats for lines that the model lacks in the records for training and, alike, in those held out.
+
+    Lines that the diagnosis would call a fault in both are as sure as its alarms: levels of a rig whose
+    structure the model has not must not outweigh that.
+    """
+    own = [sign for _, sign in candidates(context, fault, absent=True) if sign.component == component]
+    if own and own[0].run is not None:
+        # Found by as much as the diagnosis asks for, and again by as much as counts in itself.
+        return FAULT_NATS if shown_again(own[0], heldout) else 0.0
+    found: list[Sign] = []
     for each in (context, heldout):
         signs = candidates(each, fault, absent=True)
-        own = [sign.found_order for _, sign in signs if sign.component == component]
-        if not own:
+        mine = [sign for _, sign in signs if sign.component == component]
+        if not mine:
             return 0.0
-        orders.append(own[0])
-    return REPEATED_NATS if abs(orders[1] / orders[0] - 1.0) < _ALIKE else 0.0
+        found.append(mine[0])
+    if abs(found[1].found_order / found[0].found_order - 1.0) >= _ALIKE:
+        return 0.0
+    return FAULT_NATS if all(sign.is_fault for sign in found) else REPEATED_NATS
 
 
 def known_width_m(context: Context, record: int, sign: Sign) -> float | None:
     """Width of a spall by the events of its crossings, if they tell it."""
+    if sign.run is not None:
+        return None
     sizing = size_of(context.views[record], sign)
     return None if sizing is None or sizing.width is None else sizing.width.value_m
 
@@ -80,6 +105,11 @@ def sign_words(sign: Sign, context: Context, record: int) -> dict[str, float | s
         "line_order": float(f"{sign.expected_order:.6g}"),
         "line_hz": float(f"{sign.expected_order * context.views[record].speed_hz:.4g}"),
     }
+
+
+def damaged(fault: str, component: str) -> str:
+    """What localised and wide spalls of a race have in common."""
+    return f"a damaged {fault.replace('_', ' ')} of {component}"
 
 
 def width_starts(
@@ -119,6 +149,7 @@ class RaceSpall:
 
     parameters: tuple[Parameter, ...] = (SPALL_WIDTH,)
     size = SPALL_WIDTH.name
+    superposes = True
 
     def __init__(self, name: str, fault: str, kind: str, confused_with: tuple[tuple[str, str], ...]) -> None:
         self.name = name
@@ -152,6 +183,10 @@ class RaceSpall:
     def told_again(self, values: Values, context: Context, heldout: Context) -> float:
         """Nats for its lines being found, and found again in records held out."""
         return seen_again(str(values["component"]), self.fault, context, heldout)
+
+    def thing(self, values: Values) -> str:
+        """What is damaged, by whichever name."""
+        return damaged(self.fault, str(values["component"]))
 
     def signature(self, values: Values) -> str:
         """In plain words."""

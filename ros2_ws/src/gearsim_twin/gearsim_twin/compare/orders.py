@@ -1,7 +1,8 @@
 """Domain orders: lines of shafts, meshes, planets and carriers over the angle, and tones that belong to none.
 
-Kinds: mesh, sideband, shaft, half, carrier, planet (at an order); tone (at an order, or in Hz). The level is
-that of the line's mean square, noise under it included, in dB of the record's unit squared.
+Kinds: mesh, sideband, shaft, half, carrier, planet (at an order); tone (at an order, or in Hz); passage (see
+`passage_places`). The level is that of the line's mean square, noise under it included, in dB of the record's
+unit squared.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsim_twin.compare import passage_places
 from gearsim_twin.compare.frame import Frame
 from gearsim_twin.compare.known_orders import known_orders
-from gearsim_twin.compare.levels import Levels
+from gearsim_twin.compare.levels import Levels, joined
 from gearsim_twin.compare.lines import LineLevels, line_levels
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.places import Place
@@ -43,11 +45,20 @@ def places(frame: Frame, materials: Sequence[Material]) -> list[Place]:
         for tone in strongest(materials, channel, top, each, apart):
             width = _BINS / (frame.window_s if tone.unit == "Hz" else frame.window_turns)
             found.append(Place("orders", channel, "tone", tone.at, tone.unit, width, tone.label))
-    return found
+    return [*found, *passage_places.places(frame, materials)]
 
 
 def measure(material: Material, wanted: Sequence[Place]) -> Levels:
-    """Levels of lines and tones."""
+    """Levels of lines and tones, and of passages."""
+    # Passages are the last of all places.
+    lines = [place for place in wanted if place.kind != passage_places.KIND]
+    found = _measured(material, lines)
+    if len(lines) == len(wanted):
+        return found
+    return joined([found, passage_places.measure(material, wanted[len(lines) :])])
+
+
+def _measured(material: Material, wanted: Sequence[Place]) -> Levels:
     at = np.array([place.at for place in wanted])
     level, std, height, clear = (np.full(at.size, np.nan) for _ in range(4))
     hz, bandwidth = np.full(at.size, np.nan), np.full(at.size, np.nan)

@@ -93,6 +93,8 @@ class Place:
             return f"noise at {hz_text(self.at)}"
         if self.kind == "floor":
             return "floor"
+        if self.kind == "passage":
+            return f"lines from {name} on ({self._position(speed_hz)})"
         plain = name.startswith(("tone", "modulation", "sidebands"))
         head = "coherence at " if self.domain == "cyclic" else "" if plain else "line "
         return f"{head}{name} ({self._position(speed_hz)})"

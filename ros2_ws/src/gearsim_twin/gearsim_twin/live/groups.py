@@ -18,7 +18,7 @@ from gearsim_twin.compare.places import Domain, Place, band_text, hz_text
 
 __all__ = ["Group", "Residual", "groups_of", "residuals"]
 
-_LEFT_OUT = ("tone", "ratio")
+_LEFT_OUT = ("tone", "ratio", "passage")
 
 
 @dataclass(frozen=True, slots=True)
