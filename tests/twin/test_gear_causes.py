@@ -73,6 +73,7 @@ def first(name: str, context: Context) -> dict[str, Any]:
         ("unbalance", "unbalance", "input", {"unbalance_kg_m": 0.05, "phase_rad": -1.0}, "unbalance_kg_m"),
         # More than the weight of the shaft and the load of the teeth: bearings and mesh part.
         ("unbalance", "unbalance", "input", {"unbalance_kg_m": 0.18, "phase_rad": 0.5}, "unbalance_kg_m"),
+        ("looseness", "looseness", "bearing_3", {"reduction": 0.2}, "reduction"),
         ("looseness", "looseness", "bearing_2", {"reduction": 0.4}, "reduction"),
         ("looseness", "looseness", "bearing_4", {"reduction": 0.9}, "reduction"),
         ("misalignment", "shaft_misalignment", "input", {"offset_m": 0.0, "angle_rad": 0.02}, "angle_rad"),

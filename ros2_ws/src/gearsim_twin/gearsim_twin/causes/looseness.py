@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gearsim_twin.causes.cause import Content, Parameter, Values
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Looseness"]
 
-_UNIT = 0.6
+_UNIT = 0.25
 _BOUNDS = (0.05, 0.95)
 _MOST = 3
 
@@ -44,9 +45,17 @@ class Looseness:
         return bool(context.contents) and bool(parts_of(context.contents[0], "looseness"))
 
     def starts(self, context: Context) -> list[dict[str, float | str]]:
-        """The feet whose lifting answers most, with the share of stiffness that is lost."""
-        parts = parts_of(context.contents[0], "looseness")
-        found = matches(context, parts, self._build, _UNIT, _BOUNDS)
+        """The feet whose lifting answers most, with the share of stiffness that is lost.
+
+        What lifts a foot once a turn are run-outs of the wheels, whose angles differ from machine to machine:
+        so lines beside the mesh may stand at any.
+        """
+        content = context.contents[0]
+        teeth = {round(shaft.turns, 9): shaft.teeth for shaft in parts_of(content, "unbalance")}
+        feet = [
+            replace(foot, teeth=teeth.get(round(foot.turns, 9), 1)) for foot in parts_of(content, "looseness")
+        ]
+        found = matches(context, feet, self._build, _UNIT, _BOUNDS, angle="any")
         return [{"component": match.part.name, "reduction": match.value} for match in found[:_MOST]]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

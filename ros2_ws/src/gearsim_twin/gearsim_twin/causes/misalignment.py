@@ -66,11 +66,21 @@ class Misalignment:
         """Shafts whose coupling answers most, by offset or by angle, and meshes by a lead error."""
         # Offset and angle at once tell the shaft and the direction; how much of which, each by itself.
         tried = [replace(part, side=str(d)) for part in self._couplings(context) for d in range(_DIRECTIONS)]
-        both = matches(context, tried, self._both, _OFFSET_M, _OFFSETS_M, power=_BETWEEN, top=_TOP)[:1]
+        both = matches(
+            context, tried, self._both, _OFFSET_M, _OFFSETS_M, angle="any", power=_BETWEEN, top=_TOP
+        )[:1]
         shafts = [match.part for match in both]
-        offset = matches(context, shafts, self._offset, _OFFSET_M, _OFFSETS_M, top=_TOP)
+        # On a shaft a coupling may stand at any angle.
+        offset = matches(context, shafts, self._offset, _OFFSET_M, _OFFSETS_M, angle="any", top=_TOP)
         angle = matches(
-            context, shafts or tried, self._angle, _ANGLE_RAD, _ANGLES_RAD, power=_GROWS, top=_TOP
+            context,
+            shafts or tried,
+            self._angle,
+            _ANGLE_RAD,
+            _ANGLES_RAD,
+            angle="any",
+            power=_GROWS,
+            top=_TOP,
         )
         lead = matches(context, self._meshes(context)[:1], self._lead, _LEAD_RAD, _LEADS_RAD)
         guesses = [_guess(m, m.value, _NONE_RAD) for m in offset]
