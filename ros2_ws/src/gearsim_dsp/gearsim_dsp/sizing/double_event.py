@@ -9,6 +9,12 @@ that entry and impact go through one path (an ARX model; Ljung, System Identific
 release distance and moment of entry the best path is a matter of least squares, and the error that remains
 tells how likely they are; the ringing of earlier impacts obeys the same a and needs no u. All widths are
 tried, first quickly, with the a of a fit without u, by correlation; then the best ones in earnest.
+
+How many coefficients b the path has is part of the question. On a stiff pedestal a bearing is heard through a
+resonance or two, and few b do. Through a flexible casing dozens of modes are heard at once, whose sum has
+about as many zeros as poles: few b cannot place these, and entry and impact fit best where they are not. Many
+b, on the other hand, can turn one event into two, so that a wrong width explains as much as the right one. So
+both are tried, and the many have to be worth it (`Explanations.criterion`).
 """
 
 from __future__ import annotations
@@ -24,21 +30,25 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize
 
 from gearsim_dsp.sizing.crossing import RELEASE_LOG_SD, force_change
+from gearsim_dsp.sizing.votes import DISPERSION
 
-__all__ = ["Explanations", "PathFit", "explain"]
+__all__ = ["FEW", "MANY", "Explanations", "PathFit", "explain"]
 
-_TAPS = 4
+# Numbers of direct coefficients. On rigs without a casing four do, and ten lose narrow spalls; in the casing
+# ten do (docs/methods/spall_size.md).
+FEW, MANY = 4, 10
 _RELEASES = np.exp(np.linspace(-2.2, 1.8, 8) * RELEASE_LOG_SD)
 _WIDTH_STEP = 0.012
 _CANDIDATES = 20
 _PEAK_SAMPLES = 1.5
 _EVALUATIONS = 140
-_SINGULAR = 1e-9
+_SINGULAR = 1e-9  # of the longest one: a column that differs by less from those before it is none of its own
 _MOST_SD = 2.6
 _LEVEL_SAMPLES = 5
 _MODEL_SHARE = 0.3
 _HALVES = (0.7, 1.0, 1.4, 2.0, 2.8)
 _IMPULSE_REACH = 1.5  # release distances about the middle in which a single impulse is looked for
+_Way = tuple[float, float, float, float]  # gain or cost, entry, width, release
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +64,10 @@ class Explanations:
         the best one leaves.
     without_event, impulse : float
         What a path that nothing drives and one that a single impulse drives leave, in the same unit.
+    criterion : float
+        m log(errors) + (q + 1) log m of the best one; the less, the likelier is a path of that length, as the
+        difference of two is twice that of their log evidence (Schwarz, Ann. Statist. 6 (1978) 461-464). m:
+        errors that are independent, of those that p leaves free one in `votes.DISPERSION`.
     """
 
     entry: NDArray[np.float64]
@@ -62,6 +76,7 @@ class Explanations:
     cost: NDArray[np.float64]
     without_event: float
     impulse: float
+    criterion: float
 
     @property
     def spacing(self) -> float:
@@ -85,57 +100,90 @@ class PathFit:
         Number p of the path's recursive coefficients.
     release : float
         Expected release distance in samples.
+    length : int
+        Number q + 1 of the direct coefficients.
     """
 
-    def __init__(self, mean: NDArray[np.float64], order: int, release: float) -> None:
+    def __init__(self, mean: NDArray[np.float64], order: int, release: float, length: int) -> None:
         self.order = order
         self.release = release
+        self.length = length
         past = np.column_stack([mean[order - k : mean.size - k] for k in range(1, order + 1)])
         own, _ = np.linalg.qr(past)
         self.plain_residual = mean[order:] - own @ (own.T @ mean[order:])
         self._weight = _weights(self.plain_residual)
-        self._past, _ = np.linalg.qr(past * self._weight[:, None])
+        weighted, _ = np.linalg.qr(past * self._weight[:, None])
         target = mean[order:] * self._weight
-        self.residual = target - self._past @ (self._past.T @ target)
-        self._index = np.arange(mean.size, dtype=np.float64)
+        self.residual = target - weighted @ (weighted.T @ target)
+        self._past = np.ascontiguousarray(weighted.T)
+        self._without = float(self.residual @ self.residual)
+        self._size = mean.size
 
     @property
     def without_event(self) -> float:
         """Sum of squared errors of a path that nothing drives."""
-        return float(self.residual @ self.residual)
+        return self._without
 
     @property
     def freedom(self) -> int:
         """Values less coefficients."""
-        return int(self.residual.size - self.order - _TAPS - 3)
+        return int(self.residual.size - self.order - self.length - 3)
 
-    def error(self, drive: NDArray[np.float64]) -> float:
-        """Sum of squared errors with the best path for this u, shape (n,)."""
-        columns = np.empty((self.residual.size, _TAPS))
-        for k in range(_TAPS):
-            columns[:, k] = drive[self.order - k : drive.size - k] * self._weight
-        columns -= self._past @ (self._past.T @ columns)
-        gram = columns.T @ columns
-        against = columns.T @ self.residual
-        values, vectors = np.linalg.eigh(gram)
-        keep = values > _SINGULAR * values[-1]
-        parts = (vectors.T @ against)[keep]
-        return self.without_event - float(np.sum(parts**2 / values[keep]))
+    def criterion(self, error: float) -> float:
+        """What `Explanations.criterion` is, for a sum of squared errors."""
+        independent = (self.residual.size - self.order) / DISPERSION
+        return independent * math.log(max(error, 1e-300)) + self.length * math.log(independent)
 
-    def cost(self, entry: float, log_width: float, log_release: float, unit: float) -> float:
+    def error(self, drive: NDArray[np.float64], first: int) -> float:
+        """Sum of squared errors with the best path.
+
+        Parameters
+        ----------
+        drive : ndarray of float64, shape (m,)
+            The force u from `first` on; elsewhere there is none.
+        first : int
+            Index in the mean.
+        """
+        length, begin = self.length, first - self.order  # in the residual
+        start, stop = max(begin, 0), min(begin + drive.size + length - 1, self.residual.size)
+        if stop <= start:
+            return self._without
+        columns = np.zeros((drive.size + length - 1, length))
+        for k in range(length):
+            columns[k : k + drive.size, k] = drive
+        columns = columns[start - begin : stop - begin] * self._weight[start:stop, None]
+        known = self._past[:, start:stop] @ columns
+        against = columns.T @ self.residual[start:stop, None]
+        parts = _parts(columns.T @ columns - known.T @ known, against)
+        return self._without - float(np.sum(parts**2))
+
+    def cost(self, entry: float, width: float, release: float, unit: float) -> float:
         """Squared error plus `unit` times the squared deviation of the release from its expectation."""
-        off = (log_release - math.log(self.release)) / RELEASE_LOG_SD
-        drive = force_change(self._index - entry, math.exp(log_width), math.exp(log_release))
-        return self.error(drive) + unit * off * off
+        off = (math.log(release) - math.log(self.release)) / RELEASE_LOG_SD
+        first, stop = max(0, math.floor(entry)), min(self._size, math.ceil(entry + width) + 1)
+        place = np.arange(first, stop, dtype=np.float64) - entry
+        return self.error(force_change(place, width, release), first) + unit * off * off
 
     def impulse_error(self, first: int, last: int) -> float:
         """Least error with a single impulse between two indices."""
-        least = self.without_event
-        for at in range(max(first, self.order), min(last, self._index.size - _TAPS)):
-            drive = np.zeros(self._index.size)
-            drive[at] = 1.0
-            least = min(least, self.error(drive))
-        return least
+        places = range(max(first, self.order), min(last, self._size - self.length))
+        return min([self._without, *(self.error(np.ones(1), at) for at in places)])
+
+
+def _parts(gram: NDArray[np.float64], against: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What each column explains that those before it left; the squares add up to what is explained.
+
+    Parameters
+    ----------
+    gram, against : ndarray of float64, shape (..., k, k), (..., k, ways)
+        Products of the columns with each other, and with what is to be explained.
+    """
+    longest = gram.diagonal(axis1=-2, axis2=-1).max(axis=-1)
+    gram = gram + _SINGULAR * longest[..., None, None] * np.eye(gram.shape[-1])
+    try:
+        return np.asarray(np.linalg.solve(np.linalg.cholesky(gram), against))
+    except np.linalg.LinAlgError:  # the past foretells this u: it explains nothing of its own
+        return np.zeros_like(against)
 
 
 def _weights(residual: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -150,7 +198,7 @@ def _weights(residual: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def explain(
-    mean: NDArray[np.float64], order: int, release: float, limits: tuple[float, float]
+    mean: NDArray[np.float64], order: int, release: float, limits: tuple[float, float], length: int = FEW
 ) -> Explanations:
     """Compare ways across spalls that could have made the mean impact.
 
@@ -158,18 +206,18 @@ def explain(
     ----------
     mean : ndarray of float64, shape (n,)
         Mean impact, its loudest moment about the middle.
-    order : int
+    order, length : int
         Of the path, see `PathFit`.
     release : float
         Expected release distance in samples.
     limits : tuple of float
         Least and greatest width looked for, in samples.
     """
-    fit = PathFit(mean, order, release)
+    fit = PathFit(mean, order, release, length)
     middle = mean.size // 2
     unit = fit.without_event / fit.freedom
     starts = sorted(_quick(fit, limits, middle), reverse=True)
-    chosen: list[tuple[float, float, float, float]] = []
+    chosen: list[_Way] = []
     # A contact that is never empty has one loud event, half-way.
     for half in release * np.array(_HALVES):
         chosen.append((0.0, middle - half, min(2 * half, limits[1]), min(half, 2 * release)))
@@ -178,7 +226,7 @@ def explain(
             chosen.append(start)
         if len(chosen) == _CANDIDATES + len(_HALVES):
             break
-    tried: list[tuple[float, float, float, float]] = []
+    tried: list[_Way] = []
     for start in chosen:
         _refine(fit, start[1:], limits, unit, tried)
     best = min(tried)
@@ -194,6 +242,7 @@ def explain(
         table[:, 0] / variance,
         fit.without_event / variance,
         impulse / variance,
+        fit.criterion(table[0, 0]),
     )
 
 
@@ -202,9 +251,9 @@ def _refine(
     start: tuple[float, float, float],
     limits: tuple[float, float],
     unit: float,
-    tried: list[tuple[float, float, float, float]],
+    tried: list[_Way],
 ) -> None:
-    """Descend from a start; all ways tried are kept as (cost, entry, width, release)."""
+    """Descend from a start (entry, width, release); all ways tried are kept with their costs."""
     expected = math.log(fit.release)
 
     def cost(q: NDArray[np.float64]) -> float:
@@ -214,8 +263,9 @@ def _refine(
             and abs(log_release - expected) < _MOST_SD * RELEASE_LOG_SD
         ):
             return 10 * fit.without_event
-        value = fit.cost(entry, log_width, log_release, unit)
-        tried.append((value, entry, math.exp(log_width), math.exp(log_release)))
+        here = (entry, math.exp(log_width), math.exp(log_release))
+        value = fit.cost(*here, unit)
+        tried.append((value, *here))
         return value
 
     entry, width, release = start
@@ -243,29 +293,25 @@ def _apart(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return max(first, last) > _PEAK_SAMPLES or abs(entry - entry2) > 2 * _PEAK_SAMPLES
 
 
-def _quick(
-    fit: PathFit, limits: tuple[float, float], middle: int
-) -> Iterator[tuple[float, float, float, float]]:
+def _quick(fit: PathFit, limits: tuple[float, float], middle: int) -> Iterator[_Way]:
     """(gain, entry, width, release) of the best moment for every shape, with the path fitted beforehand."""
     size = sfft.next_fast_len(2 * fit.plain_residual.size, real=True)
     spectrum = sfft.rfft(fit.plain_residual, size)
+    lags = np.arange(fit.length)
+    apart = np.abs(np.subtract.outer(lags, lags))
     width, widest = limits
     while width < widest:
-        for release in fit.release * _RELEASES:
-            if release > max(0.75 * width, fit.release * _RELEASES[1]):
-                continue
-            shape = force_change(np.arange(math.ceil(width) + 1, dtype=np.float64), width, release)
-            shape = np.concatenate((shape, np.zeros(_TAPS)))
-            match = sfft.irfft(spectrum * np.conj(sfft.rfft(shape, size)), size)
-            own = np.array([shape[k:] @ shape[: shape.size - k] for k in range(_TAPS)])
-            values, vectors = np.linalg.eigh(own[np.abs(np.subtract.outer(range(_TAPS), range(_TAPS)))])
-            keep = values > _SINGULAR * values[-1]
-            turn = vectors[:, keep] / np.sqrt(values[keep])
-            # The loudest event, either of the two, is near the middle.
-            early = int(middle - fit.order - width - 4)
-            entries = np.arange(max(0, early), max(1, middle - fit.order + 4))
-            taps = np.stack([match[entries + k] for k in range(_TAPS)])
-            gain = np.sum((turn.T @ taps) ** 2, axis=0)
-            best = int(np.argmax(gain))
-            yield float(gain[best]), float(entries[best] + fit.order), width, float(release)
+        place = np.arange(math.ceil(width) + 1, dtype=np.float64)
+        longest = max(0.75 * width, fit.release * _RELEASES[1])
+        releases = [float(r) for r in fit.release * _RELEASES if r <= longest]
+        shapes = sfft.rfft([force_change(place, width, release) for release in releases], size)
+        match = sfft.irfft(spectrum * np.conj(shapes), size)
+        own = sfft.irfft(np.abs(shapes) ** 2, size)
+        # The loudest event, either of the two, is near the middle.
+        early = int(middle - fit.order - width - 4)
+        entries = np.arange(max(0, early), max(1, middle - fit.order + 4))
+        parts = _parts(own[:, apart], match[:, entries + lags[:, None]])
+        for gains, release in zip(np.sum(parts**2, axis=1), releases, strict=True):
+            best = int(np.argmax(gains))
+            yield float(gains[best]), float(entries[best] + fit.order), width, release
         width += max(0.7, _WIDTH_STEP * width)
