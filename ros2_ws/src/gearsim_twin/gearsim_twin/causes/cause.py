@@ -70,9 +70,9 @@ class Cause(Protocol):
     A cause that is read off where lines lie has a method `told_again(values, context, heldout)` instead: nats
     by which these positions, in records for training and again in those held out, speak for it.
     What the measuring chain of a model can make up for (gains, floors, bandwidths) has `of_chain` true.
-    Beside records of the healthy machine (`familiar`) it matters how a cause changes what these show. One with
-    `superposes` true adds an oscillation to those there; one with `scales` true makes all that is there more or
-    less, whatever it comes from. The others add power where they add, and scale where they take away.
+    Beside records of the healthy machine (`familiar`) it matters how a cause changes what these show. One
+    with `superposes` true adds an oscillation to those there; one with `scales` true makes all that is there
+    more or less, whatever it is. The others add power where they add, and scale where they take away.
     A cause whose first guesses may be far off in strength names the parameter that goes to nothing with it in
     an attribute `size`: a guess that shows too much is tried again with less of it.
     """
