@@ -136,7 +136,8 @@ def test_lines_of_a_spall_are_proven_where_both_sets_of_records_have_them_in_one
 
     def found(orders, _, *, absent):
         assert absent  # not merely hidden by noise
-        return [(0, SimpleNamespace(component="b", found_order=order)) for order in orders]
+        sign = {"component": "b", "run": None, "is_fault": False}
+        return [(0, SimpleNamespace(found_order=order, **sign)) for order in orders]
 
     monkeypatch.setattr(spalls, "candidates", found)
     assert spalls.seen_again("b", "outer_race", [3.24], [3.25]) == REPEATED_NATS

@@ -64,6 +64,18 @@ class Candidate:
         """Log odds by all records: evidence of those for training, and what that predicts of the others."""
         return self.lead_nats + (0.0 if self.gain is None else self.gain.nats)
 
+    def could_stand_for(self, other: Candidate) -> bool:
+        """Whether it explains what another one does, so that one of the two is enough.
+
+        What was found again by itself, and is no other name of the other, stands beside it.
+        """
+        if self.proof_nats <= 0.0 or (self.thing and self.thing == other.thing):
+            return True
+        one, two = self.extension.cause, other.extension.cause
+        return (
+            one.name == two.name or two.name in dict(one.confused_with) or one.name in dict(two.confused_with)
+        )
+
     @property
     def thing(self) -> str:
         """What is wrong by this cause, where several causes are names of it; "" where there is no other."""

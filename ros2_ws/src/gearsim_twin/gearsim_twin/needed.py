@@ -85,7 +85,8 @@ def _judged(choice: Choice, choices: list[Choice], lead_nats: float) -> Choice:
     """
     taken = {each.key for each in choices}
     own = choice.candidate
-    rivals = [each for each in choice.round.candidates if each.extension.key not in taken]
+    others = [each for each in choice.round.candidates if each.extension.key not in taken]
+    rivals = [each for each in others if each.could_stand_for(own)]
     odds = [(each, math.exp(min(each.all_nats - own.all_nats, 50.0))) for each in rivals]
     alike = sum(value for each, value in odds if own.thing and each.thing == own.thing)
     total = 1.0 + math.exp(min(-lead_nats, 50.0)) + sum(value for _, value in odds)

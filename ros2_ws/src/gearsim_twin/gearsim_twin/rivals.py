@@ -68,7 +68,7 @@ def _rivals(choice: Choice, selection: Selection) -> list[tuple[Candidate, float
     return [
         (each, choice.probability * math.exp(min(each.all_nats - own, 0.0)))
         for each in choice.round.candidates
-        if each.extension.key not in taken
+        if each.extension.key not in taken and each.could_stand_for(choice.candidate)
     ]
 
 

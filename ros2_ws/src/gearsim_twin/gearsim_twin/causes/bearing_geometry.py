@@ -37,6 +37,7 @@ _MOST_CHANGE = 0.3
 _SPIN_DOUBT = 3.0
 _ROOM = 0.99
 _MOST_STARTS = 4
+_VARIANTS = {_ANGLE: "another contact angle", _DIAMETER: "elements of another diameter"}
 
 
 class BearingGeometry:
@@ -93,16 +94,21 @@ class BearingGeometry:
         share = (1.0 - turning * gamma) / (1.0 - turning * law.gamma) - 1.0
         return cage_nats(context, heldout, component, lambda _: share)
 
+    def thing(self, values: Values) -> str:
+        """What is wrong, whether by the elements or by the angle."""
+        return f"other dimensions of {values['component']} than on the nameplate"
+
+    def variant(self, values: Values) -> str:
+        """What of the dimensions it is."""
+        return _VARIANTS[str(values["by"])]
+
     def signature(self, values: Values) -> str:
         """In plain words."""
         change = 100 * float(values["diameter_ratio_change"])
-        which = {_ANGLE: "another contact angle", _DIAMETER: "elements of another diameter"}[
-            str(values["by"])
-        ]
         count = "" if values["told"] == _DIAMETER else f", {values['rolling_elements']} elements"
         return (
             f"BPFO and BPFI of {values['component']} off by as many hertz to either side, the same in all "
-            f"records: d cos(a) / D is {change:+.2g} % off the nameplate's ({which}{count})"
+            f"records: d cos(a) / D is {change:+.2g} % off the nameplate's ({self.variant(values)}{count})"
         )
 
 

@@ -13,7 +13,14 @@ from gearsim_twin.causes.bearing_model import seat_of
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.prior import LogNormal
-from gearsim_twin.causes.spalls import candidates, has_bearings, known_width_m, seen_again, sign_words
+from gearsim_twin.causes.spalls import (
+    candidates,
+    damaged,
+    has_bearings,
+    known_width_m,
+    seen_again,
+    sign_words,
+)
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -36,6 +43,7 @@ class WideSpall:
     """A pit of a race with entry edge, floor and exit edge."""
 
     name = "wide_spall"
+    superposes = True
     size = "depth_m"
     parameters: tuple[Parameter, ...] = (
         Parameter("length_m", "m", LogNormal(4e-3, 2.0, 1e-3, 0.1)),
@@ -91,6 +99,10 @@ class WideSpall:
         """Nats for its lines being found, and found again in records held out."""
         fault = next(fault for fault, race in _RACES.items() if race == values["race"])
         return seen_again(str(values["component"]), fault, context, heldout)
+
+    def thing(self, values: Values) -> str:
+        """What is damaged, by whichever name."""
+        return damaged(f"{values['race']}_race", str(values["component"]))
 
     def signature(self, values: Values) -> str:
         """In plain words."""
