@@ -162,3 +162,33 @@ def test_all_models_are_scored_at_the_same_places_and_silence_is_bounded():
     assert scores.overall.models["silent"].value == pytest.approx(40.0)
     with pytest.raises(InputError, match="noisy"):
         score_models([real, real], {"noisy": [noisy]})
+
+
+def test_a_lone_place_is_told_by_how_little_the_others_of_this_model_differ():
+    rng = np.random.default_rng(4)
+    level = 0.4 * rng.standard_normal(40)
+    level[17] = 5.5
+    known = {"psd": 0.0}
+
+    def told(shown):
+        return [
+            p.at
+            for d in discrepancies([compare(by_hand(BANDS, shown), by_hand(BANDS, 0.0, 1e-9), known)])
+            for p in d.places
+        ]
+
+    # Of tails as heavy as for any model 5.5 standard deviations at one of 40 places are no certainty.
+    assert told(level) == [BANDS[17].at]
+    # The same of a model that errs by twice as much as is assumed of any.
+    assert told(5.0 * level * (np.arange(40) != 17) + np.where(np.arange(40) == 17, 5.5, 0.0)) == []
+
+
+def test_an_effect_that_fills_a_domain_is_no_error_of_the_model():
+    assert len(discrepancies([compare(by_hand(BANDS, 15.0), by_hand(BANDS, 0.0))])[0].places) == 40
+
+
+def test_few_places_do_not_hide_one_that_differs():
+    places = (*BANDS, *LINES[:2])
+    level = np.concatenate([np.full(40, 0.2), [9.0, 0.3]])
+    (one,) = discrepancies([compare(by_hand(places, level), by_hand(places, 0.0, 0.1))])
+    assert one.places == (LINES[0],)

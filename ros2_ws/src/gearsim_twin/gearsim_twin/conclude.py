@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,10 @@ __all__ = ["Evidence", "concluded"]
 _HALVED = 0.5
 
 
+def _no_patterns(rest: Sequence[Discrepancy]) -> tuple[str, ...]:  # noqa: ARG001
+    return ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
     """All that a verdict rests on.
@@ -43,6 +47,8 @@ class Evidence:
     remarks : tuple of str
     label : Label or None
         What the records say against their labels.
+    patterns : callable
+        What differences that nothing explains have in common, a phrase each.
     """
 
     bench: Workbench
@@ -53,6 +59,7 @@ class Evidence:
     scores: Scores
     remarks: tuple[str, ...]
     label: Label | None = None
+    patterns: Callable[[Sequence[Discrepancy]], tuple[str, ...]] = _no_patterns
 
     def comparisons(self, trial: Trial) -> list[Comparison]:
         """Training records beside a model."""
@@ -71,7 +78,8 @@ def concluded(evidence: Evidence) -> Verdict:
     label = evidence.label
     word = _word(bool(found or label), after)
     others = [each for choice in selection.choices for each in alternatives(choice, selection)]
-    unknown = [_unknown(after, selection)] if word in ("unknown", "partly_explained") else []
+    told = word in ("unknown", "partly_explained")
+    unknown = [_unknown(after, selection, evidence.patterns(after))] if told else []
     return Verdict(
         word=word,
         scores=scores,
@@ -124,7 +132,7 @@ def _found(choice: Choice, number: int, selection: Selection) -> Found:
     )
 
 
-def _unknown(rest: Sequence[Discrepancy], selection: Selection) -> Found:
+def _unknown(rest: Sequence[Discrepancy], selection: Selection, patterns: Sequence[str]) -> Found:
     """What none of the causes explains; its probability is that of none of those fitted last."""
     last: Sequence[Candidate] = selection.rounds[-1].candidates if selection.rounds else ()
     against = sum(math.exp(min(each.lead_nats, 50.0)) for each in last if each.gain is not None)
@@ -136,7 +144,7 @@ def _unknown(rest: Sequence[Discrepancy], selection: Selection) -> Found:
         heldout_ci95_db=(0.0, 0.0),
         domain=rest[0].domain,
         probability=1.0 / (1.0 + against) if not selection.choices else 1.0,
-        signature=describe_rest(rest),
+        signature=describe_rest(rest, patterns),
     )
 
 

@@ -33,6 +33,7 @@ from gearsim_twin.heard import heard
 from gearsim_twin.labels import speed_label
 from gearsim_twin.measuring_chain import measuring_chain
 from gearsim_twin.model import Model
+from gearsim_twin.patterns import patterns_of
 from gearsim_twin.realisations import Realisations, realisations_of
 from gearsim_twin.score import score_models
 from gearsim_twin.select import select
@@ -304,7 +305,8 @@ def _judged(
     )
     told_by = [*case.remarks, *(each for view in bench.views for each in view.remarks), *of_healthy]
     remarks = dict.fromkeys(told_by)
-    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label)
+    shared = partial(patterns_of, lambda: context_of(selection.final.trial), bench.search.frame)
+    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label, shared)
     verdict = concluded(evidence)
     if show:
         tell("gathering what is shown")

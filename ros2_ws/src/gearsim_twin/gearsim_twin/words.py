@@ -26,9 +26,12 @@ def material(discrepancies: Sequence[Discrepancy]) -> tuple[Discrepancy, ...]:
     )
 
 
-def describe_rest(rest: Sequence[Discrepancy]) -> str:
-    """The signature of what is left, in plain words with frequencies and orders; what is in excess first."""
+def describe_rest(rest: Sequence[Discrepancy], patterns: Sequence[str] = ()) -> str:
+    """The signature of what is left, in plain words with frequencies and orders; what is in excess first.
+
+    `patterns` are what it has in common, and come before all.
+    """
     first = sorted(rest, key=lambda each: (each.size_db < 0, -abs(each.z)))
     told = "; ".join(each.words() for each in first[:_MOST])
     more = len(rest) - _MOST
-    return told + (f"; and {more} more" if more > 0 else "")
+    return "; ".join([*patterns, told]) + (f"; and {more} more" if more > 0 else "")

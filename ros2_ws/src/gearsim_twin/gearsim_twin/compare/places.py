@@ -86,7 +86,8 @@ class Place:
         if self.domain == "statistics":
             return _STATISTICS.get(self.kind, self.kind)
         if self.domain == "transient":
-            return _TRANSIENT[self.kind].format(label=self.label)
+            position = f" ({self._position(speed_hz)})" if self.unit == "order" else ""
+            return _TRANSIENT[self.kind].format(label=self.label) + position
         if self.kind == "ratio":
             return f"frequency of {name} ({self._position(speed_hz)})"
         if self.domain == "psd":
