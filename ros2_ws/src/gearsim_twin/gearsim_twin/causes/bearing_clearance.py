@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["BearingClearance"]
 
 _KIND = "bearing_clearance"
-_GUESSES_M = (5e-6, 15e-6)
+# Which elements carry changes with tenths of a micrometre: between these, smaller ones are tried as `size`.
+_GUESSES_M = (2e-6, 6e-6, 18e-6)
 _ROOM = 0.98
 _MOST_BEARINGS = 2
 
@@ -30,7 +31,8 @@ class BearingClearance:
     """Clearance that has grown."""
 
     name = "bearing_clearance"
-    parameters: tuple[Parameter, ...] = (Parameter("growth_m", "m", LogNormal(8e-6, 2.2, 5e-7, 2e-4)),)
+    parameters: tuple[Parameter, ...] = (Parameter("growth_m", "m", LogNormal(5e-6, 3.0, 1e-7, 2e-4)),)
+    size = "growth_m"
     confused_with: tuple[tuple[str, str], ...] = (
         ("bearing_spall_outer", "kurtosis above 5 kHz: varying compliance pushes without impacts"),
         ("casing_resonance", "a second load: a bearing's stiffness grows with the load, a casing's does not"),

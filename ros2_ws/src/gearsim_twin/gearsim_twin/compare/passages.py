@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol, TypeVar
 
@@ -55,6 +55,7 @@ _LOW_SHARE = 0.2
 _HALF = 1.6  # half of a line's width, in lines of a Hann window
 _LOOKS_PER_LINE = 0.6
 _STEPS_PER_LINE = 3
+_REACH, _FINE = 1.0, 41  # lines at the last harmonic, within which a fundamental is looked for more finely
 _SIDES = 3
 _BESIDE = 5e-5  # of an order: how unevenly a shaft turns between the marks of its angle
 _SKIRT = 3.0  # the median of eight lines of noise is seldom so far above the floor
@@ -93,14 +94,25 @@ class LongLines:
     ----------
     spectra : WindowSpectra
     tail : ndarray of float64, shape (lines,)
-        -ln of the probability that noise lifts a line so far.
+        -ln of the probability that noise lifts a line so far, held at a cap.
+    height : ndarray of float64, shape (lines,)
+        Logarithm of a line over the noise beside it.
     usable : ndarray of bool, shape (lines,)
         Lines that no shaft has.
     """
 
     spectra: WindowSpectra
     tail: NDArray[np.float64]
+    height: NDArray[np.float64]
     usable: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, spectra: WindowSpectra, floor: NDArray[np.float64], usable: NDArray[np.bool_]) -> LongLines:
+        """Lines over a noise floor."""
+        ratio = np.maximum(spectra.mean, np.finfo(np.float64).tiny) / floor
+        averages = spectra.averages
+        tail = np.minimum(LineTail(averages, averages * _FLOOR_WORTH)(ratio), _CAP)
+        return cls(spectra, tail, np.log(ratio), usable)
 
     @property
     def size(self) -> int:
@@ -115,12 +127,11 @@ class LongLines:
         for shift in {0.0, *turns, *(-turn for turn in turns)}:
             number = np.maximum(1.0, np.round((at - shift) / order))
             lines |= np.abs(at - shift - number * order) < width
-        return LongLines(self.spectra, self.tail, self.usable & ~lines)
+        return replace(self, usable=self.usable & ~lines)
 
     def floored(self, floor: NDArray[np.float64]) -> LongLines:
         """The same as if it had another noise floor."""
-        ratio = self.spectra.mean / np.maximum(floor, _beside(self.spectra))
-        return LongLines(self.spectra, _tail(self.spectra, ratio), self.usable)
+        return LongLines.of(self.spectra, np.maximum(floor, _beside(self.spectra)), self.usable)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +197,7 @@ def long_lines(
     spectra = WindowSpectra(
         spectra.power[:, :kept], spectra.step, spectra.averages, np.asarray(spectra.floor[:kept])
     )
-    ratio = spectra.mean / _beside(spectra)
-    return LongLines(spectra, _tail(spectra, ratio), _free(machine, kept, spectra.step))
+    return LongLines.of(spectra, _beside(spectra), _free(machine, kept, spectra.step))
 
 
 def _beside(spectra: WindowSpectra) -> NDArray[np.float64]:
@@ -198,11 +208,6 @@ def _beside(spectra: WindowSpectra) -> NDArray[np.float64]:
     near = np.stack([padded[6 + k : 6 + k + mean.size] for k in (-6, -5, -4, -3, 3, 4, 5, 6)])
     sides = np.median(near, axis=0)
     return np.asarray(np.where(sides > _SKIRT * floor, sides, floor))
-
-
-def _tail(spectra: WindowSpectra, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-    averages = spectra.averages
-    return np.minimum(LineTail(averages, averages * _FLOOR_WORTH)(ratio), _CAP)
 
 
 def _free(machine: Machine, lines: int, step: float) -> NDArray[np.bool_]:
@@ -223,8 +228,7 @@ def _free_of(ratios: tuple[float, ...], lines: int, step: float) -> NDArray[np.b
 
 def orders_of(family: FamilyLike, order: float, first: int, count: int) -> list[float]:
     """Lines of a run of harmonics with the sidebands next to each."""
-    sides = (0.0,) if family.sideband_order <= 0 else (0.0, -family.sideband_order, family.sideband_order)
-    return [k * order + side for k in range(first, first + count) for side in sides]
+    return [k * order + side for k in range(first, first + count) for side in _sides(family)]
 
 
 def first_harmonic(families: Sequence[FamilyLike], family: FamilyLike, top_order: float) -> int:
@@ -286,7 +290,27 @@ def best_comb(
         k = int(np.argmax(np.where(number >= _FEWEST_ON * max(int(number.max()), 1), nats, -np.inf)))
         if best is None or nats[k] > best.nats:
             best = Found(float(orders[k]), first, count, float(nats[k]))
-    return best
+    return None if best is None else replace(best, order=_refined(lines, family, best))
+
+
+def _refined(lines: Sequence[LongLines], family: FamilyLike, run: Found) -> float:
+    """The fundamental near one found at which lines are highest: clear ones are held at a cap before."""
+    last = run.first + run.count - 1
+    reach = _REACH * min(one.spectra.step for one in lines) / last
+    orders = run.order + reach * np.linspace(-1.0, 1.0, _FINE)
+    height = np.zeros(orders.size)
+    for one in lines:
+        for side in _sides(family):
+            index = _index(one, orders[:, None] * np.arange(run.first, last + 1) + side)
+            height += np.where(index >= 0, one.height[index], 0.0).sum(axis=1)
+    top = orders[height >= height.max() - 1e-9]
+    return float(top.mean())
+
+
+def _sides(family: FamilyLike) -> tuple[float, ...]:
+    """Where lines lie beside a harmonic, itself among them."""
+    side = family.sideband_order
+    return (0.0,) if side <= 0 else (0.0, -side, side)
 
 
 def _sums(
@@ -296,9 +320,8 @@ def _sums(
     shape = (orders.size, highest - low + 1)
     total, counts = np.zeros(shape), np.zeros(shape)
     numbers = np.arange(low, highest + 1)
-    sides = (0.0,) if family.sideband_order <= 0 else (0.0, -family.sideband_order, family.sideband_order)
     for one in lines:
-        for side in sides:
+        for side in _sides(family):
             index = _index(one, orders[:, None] * numbers + side)
             on = index >= 0
             total += np.where(on, one.tail[index], 0.0)
