@@ -119,8 +119,11 @@ def test_clarity_is_what_was_put_in():
     assert one.share == pytest.approx(10 / (10 + 1e-4 * RATE_HZ / 2), rel=0.03)
 
 
-@pytest.mark.parametrize(("model", "race", "width_mm"), [("cb146", "inner", 1.6), ("cb182", "outer", 1.6)])
+@pytest.mark.parametrize(
+    ("model", "race", "width_mm"), [("cb146", "inner", 1.6), ("cb146", "outer", 1.2), ("cb182", "outer", 1.6)]
+)
 def test_spalls_are_sized_through_the_casing(records, model, race, width_mm):
+    """Through paths with few zeros 1.2 mm on the outer race are told as 0.7 mm."""
     sizing = sizing_of(records.signal(run_of(model, race, width_mm, 31)), race)
     assert sizing.width is not None, sizing.reason
     assert sizing.width.value_m == pytest.approx(width_mm * 1e-3, rel=GOOD)

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.sizing.crossing import RacePass, force_change
-from gearsim_dsp.sizing.double_event import explain
+from gearsim_dsp.sizing.double_event import FEW, MANY, explain
 from gearsim_dsp.sizing.double_impact import DoubleImpact, speed_law
 from gearsim_dsp.sizing.energy_pair import energy_pair
 from gearsim_dsp.sizing.impacts import mean_impact
@@ -92,6 +92,28 @@ def test_the_quiet_moment_of_entry_counts_beside_a_loud_impact():
     echoed = echoed / np.abs(echoed).max() + 0.003 * np.random.default_rng(0).standard_normal(900)
     found = explain(echoed, 40, 15.0, (8.0, 400.0))
     assert found.width[0] == pytest.approx(44.0, rel=0.03)  # with equal weights: 8
+
+
+@pytest.mark.parametrize("many_zeros", [False, True])
+def test_the_record_tells_how_many_zeros_the_path_has(many_zeros):
+    """One resonance with four direct coefficients, or thirty, each heard in its own share."""
+    width, release, rng = 46.0, 15.0, np.random.default_rng(4)
+    drive = force_change(np.arange(900.0) - (450 - width / 2), width, release)
+    noise = 0.01 * rng.standard_normal(900)
+    if many_zeros:
+        angles, shares = np.linspace(0.1, 2.9, 30), rng.standard_normal((30, 2))
+        heard = sum(
+            lfilter(share, [1, -1.9 * np.cos(angle), 0.9025], np.diff(drive, prepend=0.0))
+            for angle, share in zip(angles, shares, strict=True)
+        )
+        heard = heard / np.abs(heard).max() + noise
+    else:
+        heard = lfilter([1, -1.6, 0.3, 0.3], [1, -1.2, 0.9025], drive) + lfilter(
+            [1], [1, -1.2, 0.9025], noise
+        )
+    few, many = (explain(heard, 40, 15.0, (8.0, 400.0), length) for length in (FEW, MANY))
+    assert (many.criterion < few.criterion) == many_zeros
+    assert (many if many_zeros else few).width[0] == pytest.approx(width, rel=0.03)
 
 
 def test_one_knock_looks_like_the_narrowest_spall_of_all():
