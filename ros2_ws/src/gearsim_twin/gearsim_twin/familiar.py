@@ -42,6 +42,9 @@ _OF_IMPACTS, _IMPACT_DB = ("decay", "centre", "spacing"), 3.0
 _LEAST_LEFT = 0.05
 _MOST_DB = 60.0
 _BESIDE = 2
+_OF_LINES = ("orders", "torsional", "envelope", "cyclic")
+# Of a level that may be anything.
+_MOST_OPEN_DB = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,12 +133,12 @@ class _Rows:
         power = np.isfinite(levels.frequency_hz) | np.array([p.kind == "rms" for p in places])
         return cls(
             power=power,
-            line=np.array([p.domain in ("orders", "torsional") and p.kind != "floor" for p in places]),
+            line=np.array([p.domain in _OF_LINES and p.kind not in ("floor", "ratio") for p in places]),
             shape=np.isfinite(levels.gauss_db) & (of_band >= 0) & ~power,
             of_impacts=np.array([p.domain == "transient" and p.kind in _OF_IMPACTS for p in places]),
             order=np.array([1.0 if p.kind in _FIRST_ORDER else 2.0 for p in places]),
             of_band=of_band,
-            run=np.unique([f"{p.domain} {p.channel}" for p in places], return_inverse=True)[1],
+            run=np.unique([f"{p.domain} {p.channel} {p.band_hz}" for p in places], return_inverse=True)[1],
             scale=np.array([6.0 / p.width if p.kind == "ratio" else 1.0 for p in places]),
         )
 
@@ -146,20 +149,27 @@ class _Rows:
         scatter = np.zeros(level.size)
         p, q = _power(h.level_db), _power(bare.level_db)
         d = _power(added.level_db) - q
-        angled = self.power & self.line & (h.height_db > h.clear_db) & superposed
+        angled = self.line & (h.height_db > h.clear_db) & superposed
+        summed = self.power & angled
         with np.errstate(divide="ignore", invalid="ignore"):
-            more = np.where(angled, d**2 / (np.abs(d) + 2.0 * q), d)
-            total = np.where(self.power & (angled | (d > 0)), p + more, _power(level))
-            # An angle at which a line hides what is added to it tells its neighbours, not the line.
-            most = np.maximum(more, self.beside(more))
-            scatter = np.where(angled, _DB * np.sqrt(2.0 * (p + q) * np.maximum(most, 0.0)) / total, 0.0)
+            more = np.where(summed, _squared(d, q), d)
+            total = np.where(self.power & (summed | (d > 0)), p + more, _power(level))
+            scatter = np.where(summed, self._scattered(p, q, more, total), 0.0)
             level = np.where(self.power, 10 * np.log10(total), level)
-        level = self._shapes(h, bare, added, level)
+        level, scatter = self._shapes(h, bare, added, level, scatter, angled)
         share = np.minimum(np.abs(change) / _IMPACT_DB, 1.0)
         mixed = (1 - share) * h.level_db + share * added.level_db
         return np.where(self.of_impacts, mixed, level), np.nan_to_num(scatter)
 
-    def beside(self, power: Array) -> Array:
+    def _scattered(self, p: Array, q: Array, more: Array, total: Array) -> Array:
+        """What an angle that is not known leaves open of a level, dB.
+
+        An angle at which a line hides what is added to it tells its neighbours, not the line.
+        """
+        most = np.maximum(np.maximum(more, self._beside(more)), 0.0)
+        return np.asarray(_DB * np.sqrt(2.0 * (np.maximum(p, 0.0) + q) * most) / total)
+
+    def _beside(self, power: Array) -> Array:
         """Of each line the median over itself and two neighbours to either side, along each channel."""
         out = np.zeros(power.size)
         for run in np.unique(self.run[self.line]):
@@ -171,7 +181,15 @@ class _Rows:
             out[rows] = np.median(windows, axis=1)
         return out
 
-    def _shapes(self, h: Levels, bare: Levels, added: Levels, level: Array) -> Array:
+    def _shapes(
+        self,
+        h: Levels,
+        bare: Levels,
+        added: Levels,
+        level: Array,
+        scatter: Array,
+        angled: NDArray[np.bool_],
+    ) -> tuple[Array, Array]:
         """The same for shapes of bands, by cumulants; `level` has powers of bands and ratios of the rest."""
         k = np.flatnonzero(self.shape)
         band = self.of_band[k]
@@ -180,15 +198,28 @@ class _Rows:
         gauss = [_power(each.gauss_db[k]) for each in (h, bare, added)]
         own = (_power(h.level_db[k]) - gauss[0]) * before
         more = (_power(added.level_db[k]) - gauss[2]) * power[1]
-        more -= (_power(bare.level_db[k]) - gauss[1]) * power[0]
+        there = (_power(bare.level_db[k]) - gauss[1]) * power[0]
+        more -= there
         with np.errstate(divide="ignore", invalid="ignore"):
+            more = np.where(angled[k], _squared(more, np.maximum(there, 0.0)), more)
             shape = gauss[0] + (own + more) / after
             plain = _power(level[k])
             least = _LEAST_LEFT * np.minimum(_power(h.level_db[k]), plain)
             found = 10 * np.log10(np.where(shape > least, shape, np.maximum(plain, 1e-300)))
-        out = level.copy()
-        out[k] = np.where(np.isfinite(found), found, level[k])
-        return out
+        level, scatter = level.copy(), scatter.copy()
+        level[k] = np.where(np.isfinite(found), found, level[k])
+        sides = [np.zeros(level.size) for _ in range(3)]
+        for side, values in zip(sides, (own, np.maximum(there, 0.0), more), strict=True):
+            side[k] = np.nan_to_num(values)
+        total = np.ones(level.size)
+        total[k] = np.maximum(_power(level[k]) * after, 1e-300)
+        open_db = np.nan_to_num(self._scattered(*sides, total))
+        return level, np.where(self.shape & angled, np.minimum(open_db, _MOST_OPEN_DB), scatter)
+
+
+def _squared(difference: Array, model: Array) -> Array:
+    """Power of what was added to a line of the model at an angle, by how much the line's power changed."""
+    return np.asarray(difference**2 / (np.abs(difference) + 2.0 * model))
 
 
 def _power(level_db: Array) -> Array:
