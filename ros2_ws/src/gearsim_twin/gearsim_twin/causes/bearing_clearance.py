@@ -22,7 +22,7 @@ __all__ = ["BearingClearance"]
 
 _KIND = "bearing_clearance"
 # Which elements carry changes with tenths of a micrometre: between these, smaller ones are tried as `size`.
-_GUESSES_M = (2e-6, 6e-6, 18e-6)
+_GUESSES_M = (1.6e-6, 5e-6, 15e-6)
 _ROOM = 0.98
 _MOST_BEARINGS = 2
 

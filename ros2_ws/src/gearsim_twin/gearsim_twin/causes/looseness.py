@@ -9,6 +9,7 @@ from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.gear_model import Part, parts_of
 from gearsim_twin.causes.matched import matches
+from gearsim_twin.causes.near_bearing import by_distance
 from gearsim_twin.causes.prior import Uniform
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ __all__ = ["Looseness"]
 _UNIT = 0.25
 _BOUNDS = (0.05, 0.95)
 _MOST = 3
+_GUESSES = (0.85, 0.5)
 
 
 class Looseness:
@@ -48,7 +50,8 @@ class Looseness:
         """The feet whose lifting answers most, with the share of stiffness that is lost.
 
         What lifts a foot once a turn are run-outs of the wheels, whose angles differ from machine to machine:
-        so lines beside the mesh may stand at any.
+        so lines beside the mesh may stand at any. Where there is no mesh, passages in the bearings lift it:
+        then the bearing near which noise and envelopes differ is asked for.
         """
         content = context.contents[0]
         teeth = {round(shaft.turns, 9): shaft.teeth for shaft in parts_of(content, "unbalance")}
@@ -56,7 +59,12 @@ class Looseness:
             replace(foot, teeth=teeth.get(round(foot.turns, 9), 1)) for foot in parts_of(content, "looseness")
         ]
         found = matches(context, feet, self._build, _UNIT, _BOUNDS, angle="any")
-        return [{"component": match.part.name, "reduction": match.value} for match in found[:_MOST]]
+        machine = context.case.machine
+        if found or machine.gear_meshes or machine.planetary_stages:
+            return [{"component": match.part.name, "reduction": match.value} for match in found[:_MOST]]
+        bearings = {bearing.name for bearing in machine.bearings}
+        near = by_distance(context, [foot.name for foot in feet if foot.name in bearings])[:1]
+        return [{"component": name, "reduction": value} for name in near for value in _GUESSES]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With one loose foot, whose bolts just hold the static lift."""
