@@ -112,12 +112,13 @@ def test_the_worst_comes_first():
     assert np.allclose([each.z for each in found], [-8.0, 5.0])
 
 
-def cages(monkeypatch, training, heldout):
+def cages(monkeypatch, training, heldout, sure=True):
     """Two contexts whose records tell these deviations of a cage, each known to 0.0002."""
     from gearsim_twin.causes import cage_motion
 
     def told(context, component):
-        return [cage_motion.Deviation(0, component, x, 2e-4, None, 100.0, 0.0) for x in context]
+        motion = cage_motion.CageMotion(0.8, 1e-4, 0.0, 1e-4, sure=sure)
+        return [cage_motion.Deviation(0, component, x, 2e-4, motion, 100.0, 0.0) for x in context]
 
     monkeypatch.setattr(cage_motion, "deviations", told)
     return cage_motion.cage_nats(training, heldout, "bearing", lambda _: -1e-3)
@@ -129,6 +130,8 @@ def test_lines_out_of_place_again_speak_for_a_cage_by_their_standard_deviations(
     assert cages(monkeypatch, [-1e-3], [-4e-4]) == 0.0  # nearer to nothing than to what is stated
     assert cages(monkeypatch, [-1e-3], []) == 0.0
     assert cages(monkeypatch, [-2e-3], [-2e-3]) == 15.0  # however sure, not beyond what errors allow
+    # A weak family of lines alone is no proof that they are the bearing's.
+    assert cages(monkeypatch, [-2e-3], [-2e-3], sure=False) == REPEATED_NATS
 
 
 def test_lines_of_a_spall_are_proven_where_both_sets_of_records_have_them_in_one_place(monkeypatch):

@@ -287,6 +287,7 @@ def _judged(
         bench.views[:train], bench.views[train : train + held], causes, bench.plan.frame.window_turns
     )
     others = tuple(cause for cause in causes if label is None or cause.name != label.found.name)
+    others = () if label is not None and label.contradicted else others
     context_of, again = (partial(look, work, prior) for look in (bench.context, bench.heldout))
     selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left, again)
     tell("scoring on held-out records")

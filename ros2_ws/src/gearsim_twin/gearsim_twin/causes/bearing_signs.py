@@ -167,7 +167,7 @@ def _is_quiet(model: View, measured: View, sign: Sign, gains_db: Mapping[str, fl
     if not isinstance(band, list) or sign.channel not in model.record.channels:
         return False
     own, other = (_band_power(view, sign.channel, band[0], band[1]) for view in (model, measured))
-    return own * 10.0 ** (0.1 * gains_db.get(sign.channel, 0.0)) < _NEXT_TO_NOTHING * other
+    return bool(own * 10.0 ** (0.1 * gains_db.get(sign.channel, 0.0)) < _NEXT_TO_NOTHING * other)
 
 
 def _band_power(view: View, channel: str, low_hz: float, high_hz: float) -> float:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from gearsim_twin.causes.bearing_model import DEFECTS, alike, bearings_of, fault_of, force_n, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, signs_of
-from gearsim_twin.causes.cause import Content
+from gearsim_twin.causes.cause import REPEATED_NATS, Content
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -74,6 +74,9 @@ class CageMotion:
     spin, spin_std : float
         Turns of an element about itself per turn of the shaft, relative to the cage; NaN where no sign
         tells it.
+    sure : bool
+        Whether these are the bearing's lines for sure: two families of them, or one that the diagnosis would
+        call a fault. A weak one alone, off its place, may be another machine's.
     """
 
     share: float
@@ -82,6 +85,7 @@ class CageMotion:
     speed_std: float
     spin: float = math.nan
     spin_std: float = math.inf
+    sure: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +130,9 @@ def cage_motion(view: View, component: str) -> CageMotion | None:
     covariance = np.linalg.inv(left.T @ left)
     std, error_std = np.sqrt(np.diag(covariance))
     spin, spin_std = _spin(own, strongest, ratio, float(error), float(error_std))
-    return CageMotion(float(share), float(std), float(error), float(error_std), spin, spin_std)
+    told = [sign for sign in own if sign.fault == "cage" or sign.weight >= _TRUSTED * strongest]
+    sure = any(sign.is_fault for sign in own) or len({sign.fault for sign in told}) > 1
+    return CageMotion(float(share), float(std), float(error), float(error_std), spin, spin_std, sure)
 
 
 def _row(
@@ -235,12 +241,11 @@ def cage_nats(
     float
         0 where the records held out speak against it, or say nothing.
     """
-    told = [
-        [_speaks(one, share_of(one.force_n)) for one in deviations(each, component)]
-        for each in (context, heldout)
-    ]
+    found = [deviations(each, component) for each in (context, heldout)]
+    told = [[_speaks(one, share_of(one.force_n)) for one in side] for side in found]
     again = sum(told[1])
-    return min(sum(told[0]) + again, _MOST_NATS) if again > 0.0 else 0.0
+    sure = all(any(one.motion.sure for one in side) for side in found)
+    return min(sum(told[0]) + again, _MOST_NATS if sure else REPEATED_NATS) if again > 0.0 else 0.0
 
 
 def _speaks(one: Deviation, share: float) -> float:
