@@ -15,6 +15,7 @@ from gearsim_twin.baseline import scenario_content
 from gearsim_twin.case import load_case, make_case
 from gearsim_twin.causes import CAUSES
 from gearsim_twin.causes.context import Context
+from gearsim_twin.labels import speed_label
 from gearsim_twin.simulated import Simulator
 
 pytestmark = pytest.mark.records
@@ -107,3 +108,35 @@ def test_a_record_of_another_machine_is_called_so(record_file):
     # Both machines that it could be have 32 teeth on the reference shaft.
     assert start["component"] in ("unsw_parallel", "sq_gearbox")
     assert "the record is of another machine" in CAUSES["mislabelled_record"].signature(start)
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "machine", "channel"),
+    [
+        ("cwru/135_0.mat", "cwru_drive_end", "mfpt", "accel"),
+        ("hit_sm/SQ_OR2_1200.mat", "hit_sq", "cwru_drive_end", "drive_end"),
+    ],
+)
+def test_a_record_of_another_rig_is_no_offset_of_this_one(record_file, name, source, machine, channel):
+    """Near the speed of the wrong rig lines are found, every fourth or so of the right one."""
+    record = import_file(record_file(name), machine_file(source))
+    other = dataclasses.replace(record, channels=(channel,), data=record.data[:1], notes={}, machine="")
+    case = make_case(load_machine(machine), machine_file(machine), "bearing5", [other])
+    views = case.views()
+    label = speed_label(views[:1], views[1:], tuple(CAUSES.values()), 60.0)
+    assert label is not None
+    assert label.found.name == "mislabelled_record"
+    assert label.contradicted
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.03])
+def test_a_speed_stated_wrongly_by_three_percent_is_told_with_the_right_one(record_file, factor):
+    record = import_file(record_file("cwru/135_0.mat"), machine_file("cwru_drive_end"))
+    stated = dataclasses.replace(record, notes={**record.notes, "speed_hz": f"{29.933 * factor:.6g}"})
+    case = make_case(load_machine("cwru_drive_end"), machine_file("cwru_drive_end"), "bearing5", [stated])
+    views = case.views()
+    label = speed_label(views[:1], views[1:], tuple(CAUSES.values()), 60.0)
+    assert label is not None
+    assert label.found.name == "shaft_speed_offset"
+    (speed,) = label.found.parameters
+    assert speed.value == pytest.approx(29.937, abs=0.01)
