@@ -12,7 +12,7 @@ from bearing_cases import COMPONENT, context_of, fault, hidden, record_of
 from gearsim_io.machines import load_machine
 from gearsim_sim.scenario import parse_scenario
 from gearsim_sim.simulation import to_record
-from gearsim_twin.causes.bearing_clearance import BearingClearance
+from gearsim_twin.causes.bearing_clearance import _GUESSES_M, BearingClearance
 from gearsim_twin.causes.bearing_geometry import BearingGeometry, spin_of
 from gearsim_twin.causes.bearing_model import fault_of, force_n, most_growth_m, seat_of
 from gearsim_twin.causes.bearing_signs import signs_of
@@ -22,10 +22,12 @@ from gearsim_twin.causes.bearing_spall_outer import BEARING_SPALL_OUTER
 from gearsim_twin.causes.cage_motion import cage_motion
 from gearsim_twin.causes.cage_slip import CageSlip, load_law
 from gearsim_twin.causes.context import Context
+from gearsim_twin.causes.looseness import Looseness
 from gearsim_twin.causes.oil_film import OilFilm
 from gearsim_twin.causes.wide_spall import WideSpall
 from gearsim_twin.compare.discrepancy import compare
 from gearsim_twin.compare.features import features, make_plan
+from gearsim_twin.screen import _SMALLER
 
 SPALLS = {
     "outer_race_spall": BEARING_SPALL_OUTER,
@@ -291,6 +293,26 @@ def test_a_grown_clearance_is_asked_for_where_something_differs(growth_m):
     assert fault_of(extended, "bearing_clearance", "test_bearing")["growth_m"] == starts[-1]["growth_m"]
     runs(extended)
     assert BearingClearance().starts(compared()) == []
+
+
+def test_growths_from_tenths_of_a_micrometre_on_are_tried():
+    # Lines of a light rig change to and fro within a factor of two of growth: none lies further from a trial.
+    cause = BearingClearance()
+    prior = cause.parameters[0].prior
+    assert cause.size == cause.parameters[0].name
+    tried = [prior.value(prior.coordinate(one) + step) for one in _GUESSES_M for step in (0.0, *_SMALLER)]
+    for growth_m in np.geomspace(3e-7, 2e-5, 40):
+        assert min(abs(math.log(one / growth_m)) for one in tried) < math.log(2.0)
+
+
+def test_a_loose_foot_that_no_mesh_lifts_is_asked_for_where_something_differs(monkeypatch):
+    monkeypatch.setattr("gearsim_twin.causes.looseness.matches", lambda *_, **__: [])
+    monkeypatch.setattr("gearsim_twin.causes.looseness.by_distance", lambda _, names: list(names))
+    context = hidden("hit_sq", "outer_race_spall", 2, width_m=8e-4)
+    starts = Looseness().starts(context)
+    assert {start["component"] for start in starts} == {"test_bearing"}
+    runs(Looseness().extend(context.contents[0], starts[0], context))
+    assert Looseness().starts(hidden("lpm34", "outer_race_spall", 4, width_m=8e-4)) == []
 
 
 def test_a_film_is_asked_for_where_the_model_has_a_defect():

@@ -31,10 +31,13 @@ _KIND = "wide_spall"
 _RACES = {"outer_race": "outer", "inner_race": "inner"}
 _EDGE_RADIUS_M = 0.1e-3
 _DEPTH_M = 20e-6
-_GUESSES = (0.35, 0.9)  # of the element's diameter
+# Of the element's diameter. Two events that ring in one resonance add up or cancel as their distance changes
+# by half a period of it, some tenths of a millimetre: a fit finds but the nearest such length.
+_GUESSES = (0.9, 0.35, 0.6, 0.75, 0.48, 1.05, 0.68, 0.82)
+_SHORT = 0.35  # of less likely races
 # Shorter ones leave an element no time on the floor: they show what a localised spall shows.
 _SHORTEST = 0.25  # of the element's diameter
-_MOST_STARTS = 4
+_MOST_STARTS = 9
 _REACHED = 0.9  # of the depth that an element reaches: beyond, it would not come down to the floor
 _ROOM = 0.9  # of the race's circumference
 
@@ -70,7 +73,7 @@ class WideSpall:
         found: list[dict[str, float | str]] = []
         for number, (record, sign) in enumerate(sorted(signs, key=lambda each: -each[1].weight)):
             diameter = context.case.machine.bearing(sign.component).element_diameter_m
-            lengths = [_GUESSES[0] * diameter]
+            lengths = [_SHORT * diameter]
             if number == 0:
                 known = known_width_m(context, record, sign)
                 lengths = [part * diameter for part in _GUESSES] if known is None else [known]
