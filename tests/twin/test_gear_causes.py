@@ -163,6 +163,24 @@ def test_planets_sun_and_carrier_are_told_apart(
     assert guess[value] == pytest.approx(params[value], rel=within)
 
 
+@pytest.mark.parametrize(
+    ("kind", "component", "params", "value"),
+    [
+        ("unequal_load_sharing", "planet_2", {"excess": 0.3}, "excess"),
+        ("planet_position_error", "planet_3", {"ahead_m": -8e-6}, "ahead_m"),
+    ],
+)
+def test_what_is_wrong_of_a_planet_is_guessed_wherever_the_mark_stands(
+    kind: str, component: str, params: dict[str, Any], value: str
+):
+    found = CAUSES[kind].starts(
+        gear_context("planetary18", fault(kind, component, **params), mark_turns=0.21)
+    )
+    assert {guess["component"] for guess in found} >= {component}
+    sizes = [float(guess[value]) for guess in found if guess["component"] == component]
+    assert any(size == pytest.approx(params[value], rel=0.3) for size in sizes)
+
+
 VALUES: dict[str, tuple[str, dict[str, Any]]] = {
     "unbalance": ("lpm34", {"component": "input", "unbalance_kg_m": 0.02, "phase_rad": 1.0}),
     "gear_runout": ("lpm34", {"component": "gears.gear", "eccentricity_m": 2e-5, "phase_rad": 0.0}),

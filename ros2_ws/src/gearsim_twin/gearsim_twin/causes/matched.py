@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
+from gearsim_twin.causes.any_mark import at_any_mark
 from gearsim_twin.causes.cause import Content
 from gearsim_twin.causes.gear_model import Part, has_planets
 from gearsim_twin.causes.turn_lines import Complex, Deviation, deviation, line_count, turn_lines
@@ -93,6 +94,7 @@ def matches(
     signed: bool = False,
     top: int | None = None,
     twins: bool = True,
+    any_mark: bool = False,
 ) -> list[Match]:
     """Parts that may have an effect, the best first; empty where nothing speaks for any.
 
@@ -118,8 +120,10 @@ def matches(
     twins : bool
         Whether the effect is the same on a wheel and on its mate of as many teeth; then one is looked at.
         What wears or breaks from the root outwards is not: the one begins to bear where the other ends.
+    any_mark : bool
+        Whether the mark of the angle may stand anywhere against what stands still on the carrier.
     """
-    effect = _Effect(build, bounds, angle, power, signed, top)
+    effect = _Effect(build, bounds, angle, power, signed, top, any_mark)
     found = []
     for record in _records(context):
         once = _once(parts) if twins else parts
@@ -141,6 +145,7 @@ class _Effect:
     power: float
     signed: bool
     top: int | None
+    any_mark: bool = False
 
 
 def _anew(context: Context, found: Match, effect: _Effect, unit: float) -> Match | None:
@@ -190,6 +195,8 @@ def _match(context: Context, record: int, part: Part, effect: _Effect, size: flo
         return None
     if has_planets(content) and effect.angle != "none":
         match = _by_power(own, np.abs(with_it - without) ** 2, part)
+    elif effect.any_mark:
+        match = _at_any_mark(own, with_it - without, part, effect.signed)
     else:
         per_turn = part.turns / turns
         match = _by_angle(own, with_it - without, part, per_turn, effect.angle, effect.signed)
@@ -291,6 +298,16 @@ def _angles(part: Part, per_turn: float, angle: str) -> tuple[NDArray[np.float64
     count = {"tooth": part.teeth, "any": _ANGLES, "none": 1}[angle]
     steps = np.arange(count) / count
     return steps / per_turn, steps
+
+
+def _at_any_mark(own: Deviation, answer: Complex, part: Part, signed: bool) -> Match | None:
+    """The answer as a mark that stands anywhere would have it."""
+    found = at_any_mark(own, answer, signed)
+    if found is None or found.drop < _LEAST_DROP:
+        return None
+    share = max(found.drop / max(_square(own, own.values), 1e-300), _share(own, own, found.turned))
+    sign = math.copysign(1.0, found.amplitude)
+    return Match(part, abs(found.amplitude), 0.0, found.drop, share, sign)
 
 
 def _by_power(own: Deviation, square: NDArray[np.float64], part: Part) -> Match | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.gear_model import Part, parts_of
-from gearsim_twin.causes.matched import matches
+from gearsim_twin.causes.planets_alike import of_planets
 from gearsim_twin.causes.prior import Normal
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ __all__ = ["PlanetPositionError"]
 
 _UNIT_M = 5e-6
 _BOUNDS = (1e-7, 2e-4)
-_MOST = 3
 
 
 class PlanetPositionError:
@@ -45,10 +44,10 @@ class PlanetPositionError:
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The planets whose place answers most: ahead, which loads them, and outward, which hardly does."""
         parts = parts_of(context.contents[0], "planet_position_error")
-        found = matches(context, parts, self._build, _UNIT_M, _BOUNDS, signed=True)
+        found = of_planets(context, parts, self._build, _UNIT_M, _BOUNDS)
         return [
             {"component": match.part.name, "ahead_m": match.sign * match.value, "outward_m": 0.0}
-            for match in found[:_MOST]
+            for match in found
         ]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002

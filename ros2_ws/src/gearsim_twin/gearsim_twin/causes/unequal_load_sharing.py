@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gearsim_twin.causes.cause import Content, Parameter, Values
 from gearsim_twin.causes.edit import with_fault
 from gearsim_twin.causes.gear_model import Part, parts_of
-from gearsim_twin.causes.matched import matches
+from gearsim_twin.causes.planets_alike import of_planets
 from gearsim_twin.causes.prior import Normal
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ __all__ = ["UnequalLoadSharing"]
 
 _UNIT = 0.3
 _BOUNDS = (0.01, 0.9)
-_MOST = 3
 
 
 class UnequalLoadSharing:
@@ -46,8 +45,8 @@ class UnequalLoadSharing:
     def starts(self, context: Context) -> list[dict[str, float | str]]:
         """The planets whose excess answers most of the lines that equal planets cancel."""
         parts = parts_of(context.contents[0], "unequal_load_sharing")
-        found = matches(context, parts, self._build, _UNIT, _BOUNDS, signed=True)
-        return [{"component": match.part.name, "excess": match.sign * match.value} for match in found[:_MOST]]
+        found = of_planets(context, parts, self._build, _UNIT, _BOUNDS)
+        return [{"component": match.part.name, "excess": match.sign * match.value} for match in found]
 
     def extend(self, content: Content, values: Values, context: Context) -> Content:  # noqa: ARG002
         """With one planet that carries more or less."""
