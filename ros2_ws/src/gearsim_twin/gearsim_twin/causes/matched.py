@@ -46,7 +46,11 @@ _LEAST_OF_PLANETS = 0.01
 _SHAPE = 0.25  # shapes of answers are right to about that part of what deviates
 _ANGLES = 72
 _AGAIN = 3
-_ANEW, _OTHER_LOG = 4, math.log(1.5)
+_ANEW, _FURTHER = 4, 2.5
+# A size is that which was simulated within these factors: enough where answers grow in proportion, enough
+# where they grow by a power that is guessed, and near enough for one to be compared with others.
+_OTHER_LOG, _SAME_LOG, _NEAR_LOG = math.log(1.5), math.log(1.1), math.log(1.25)
+_LONGEST_LOG, _SHORTEST_LOG = math.log(4.0), 0.05
 _LAID = 2  # times that a record is laid over the model and what was found so far
 _LEAST_SQUARE = 0.01
 _MOST_KEPT = 48
@@ -131,7 +135,7 @@ def matches(
         found += [match for match in first if match is not None and match.drop >= _LEAST_DROP / 2]
     found.sort(key=lambda match: -match.drop)
     again = [_anew(context, one, effect, unit) for one in found[:_AGAIN]]
-    found = sorted((match for match in again if match is not None), key=lambda match: -match.drop)
+    found = sorted(again, key=lambda match: -match.drop)
     return [match for match in found if match.drop >= _LEAST_DROP and match.share >= _LEAST_SHARE]
 
 
@@ -148,21 +152,44 @@ class _Effect:
     any_mark: bool = False
 
 
-def _anew(context: Context, found: Match, effect: _Effect, unit: float) -> Match | None:
-    """The same at the size that was found, and again there, until it is the one that was simulated.
+def _anew(context: Context, found: Match, effect: _Effect, unit: float) -> Match:
+    """The same at the size that was found, and on from there, until it is the one that was simulated.
 
-    Shapes of answers change with the size: teeth and balls part, elements reach the bottom.
+    Shapes of answers change with the size: teeth and balls part, elements reach the bottom. One that takes
+    next to nothing of what deviates may do so because it is too weak for that.
     """
-    best, size = None if effect.power != 1.0 else found, unit
+    tried = [(unit, found)]
     for _ in range(_ANEW):
-        if best is not None and abs(math.log(best.value / size)) < _OTHER_LOG:
+        size = _next_size(tried, effect)
+        match = size and _match(context, _records(context)[0], found.part, effect, size)
+        if not match:
             break
-        size = (best or found).value
-        match = _match(context, _records(context)[0], found.part, effect, size)
-        if match is None or (best is not None and match.drop <= best.drop):
-            break
-        best = match
-    return best
+        tried.append((size, match))
+    # Of what was not simulated near its own size, nothing is known but that it is another.
+    return min(tried, key=lambda one: (max(abs(_wanted(one)), _NEAR_LOG), -one[1].drop))[1]
+
+
+def _wanted(one: tuple[float, Match]) -> float:
+    """Log of the size that a simulated size asks for, over it."""
+    return math.log(one[1].value / one[0])
+
+
+def _next_size(tried: Sequence[tuple[float, Match]], effect: _Effect) -> float:
+    """The size to be simulated next; 0 if the last one asks for none."""
+    size, last = tried[-1]
+    wanted = _wanted(tried[-1])
+    small = [one for one in tried if _wanted(one) > 0]
+    great = [one for one in tried if _wanted(one) <= 0]
+    if abs(wanted) < (_OTHER_LOG if effect.power == 1.0 else _SAME_LOG):
+        step = math.log(_FURTHER) if last.share < _LEAST_SHARE and len(small) == len(tried) else 0.0
+    elif small and great:
+        low, high = max(small, key=lambda one: one[0]), min(great, key=lambda one: one[0])
+        part = _wanted(low) / (_wanted(low) - _wanted(high))
+        step = math.log(low[0] / size) + min(max(part, 0.15), 0.85) * math.log(high[0] / low[0])
+    else:
+        step = min(max(wanted, -_LONGEST_LOG), _LONGEST_LOG)
+    aim = min(max(size * math.exp(step), effect.bounds[0]), effect.bounds[1])
+    return aim if abs(math.log(aim / size)) > _SHORTEST_LOG else 0.0
 
 
 def _once(parts: Sequence[Part]) -> list[Part]:
