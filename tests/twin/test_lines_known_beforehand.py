@@ -18,6 +18,9 @@ from gearsim_twin.causes.coloured_floor import floor_db
 from gearsim_twin.causes.context import Context
 from gearsim_twin.causes.expected_lines import odds_of_lines, odds_of_sine
 from gearsim_twin.causes.hum_in_all import hum_in_all
+from gearsim_twin.causes.lines import slow_part
+from gearsim_twin.choices import Candidate
+from gearsim_twin.holdout import Gain
 from gearsim_twin.stated_floor import without_floor
 from gearsim_twin.view import View, view_of
 
@@ -88,8 +91,9 @@ def test_hum_beside_an_order_is_told_by_two_records() -> None:
     """0.04 and 0.10 Hz apart: hidden in either record, not in both together."""
     found = hum_in_all(_context(_hummed(24.98, 0.02, 6), _hummed(25.05, 0.02, 7)), "accel", (50.0, 60.0))
     assert found is not None
-    frequency, std, amplitude = found
+    frequency, std, amplitude, amplitude_std = found
     assert abs(frequency - 50.0) < 3 * std < 0.05
+    assert abs(amplitude[1] - 0.02) < 3 * amplitude_std
     assert amplitude[1] == pytest.approx(0.02, rel=0.35)
 
 
@@ -150,3 +154,28 @@ def test_a_floor_that_must_be_drawn_stays(more: dict[str, str]) -> None:
     content = {"sensors": {"accelerometers": {"each": {"accel": row}}}}
     assert without_floor(content)[0] == content
     assert not without_floor(content)[1].channels
+
+
+@pytest.mark.parametrize(
+    ("proof", "nats", "holds"), [(8.0, -3.5, True), (8.0, -5.0, False), (0.0, -3.5, False)]
+)
+def test_what_is_found_again_outweighs_what_levels_say_against_it(
+    proof: float, nats: float, holds: bool
+) -> None:
+    """Dropouts drawn at other times than those of the record, surely worse by some nats."""
+    fitted = SimpleNamespace(
+        trial=SimpleNamespace(model=SimpleNamespace(extensions=[SimpleNamespace(cause=0)]))
+    )
+    candidate = Candidate(cast(Any, fitted), 5.0, proof_nats=proof)
+    gain = Gain("statistics", 0.01, (0.0, 0.02), nats, (nats - 1.0, nats + 1.0))
+    assert candidate.holds(gain, trifle_db=0.02) is holds
+
+
+def test_the_height_of_hum_is_less_sure_the_nearer_an_order() -> None:
+    stds = []
+    for shaft_hz in (24.3, 25.07, 25.03):
+        slow = slow_part(_hummed(shaft_hz, 0.02, 12), "accel", 800.0)
+        stds.append(slow.amplitude_std(50.0, slow.without_orders(800.0)))
+    # Of a sine in white noise of variance s^2 seen through a Hann window: s sqrt(2 x 1.5 / n).
+    assert stds[0] == pytest.approx(0.01 * (3.0 / T.size) ** 0.5, rel=0.35)
+    assert stds[0] < 0.6 * stds[1] < 0.36 * stds[2]

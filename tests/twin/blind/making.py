@@ -247,7 +247,6 @@ def _record(
     # The drive holds its speed within some parts in a thousand from run to run, and within a run even closer.
     mean = build.speed_hz * (1 + 0.003 * rng.course.uniform(-1, 1))
     speed = mean * (1 + _DRIVE * low_noise(halves, 2 * rate, 2.0, rng.course))
-    build.ran_hz.append(mean)
     if build.swing:
         speed += mean * build.swing * low_noise(halves, 2 * rate, build.swing_hz, rng.effects)
     turns = rng.course.uniform(0, 40) + (np.cumsum(speed) - speed) / (2 * rate)
@@ -262,6 +261,7 @@ def _record(
     accel = _motions[key]
     data = measured(build, accel, rng.effects, rng.noise, gains)
     at_samples = turns[2 * lead : -1 : 2 * rig.steps][: data.shape[1]]
+    build.ran_hz.append(float(at_samples[-1] - at_samples[0]) / (at_samples.size - 1) * rig.rate_hz)
     tachos: tuple[PulseTrain, ...] = ()
     if build.tacho_factor:
         shaft = next(track for track in plant.tracks if track.name == rig.tacho)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gearsim_twin.causes.cause import REPEATED_NATS
 from gearsim_twin.fit import Fitted
 from gearsim_twin.holdout import Gain
 from gearsim_twin.model import Extension
@@ -12,6 +13,8 @@ from gearsim_twin.screen import Screened
 __all__ = ["Candidate", "Choice", "Round"]
 
 _HARM_NATS = 2.0
+# What must be left of a proof on held-out records, which levels there speak against: odds of 1 in 20.
+_LEFT_NATS = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +46,8 @@ class Candidate:
     def holds(self, gain: Gain, trifle_db: float) -> bool:
         """Whether a gain on held-out records is real.
 
-        What was found again in them must do no sure harm to likelihood and error at once; nor must what the
+        What was found again in them must do no sure harm to likelihood and error at once, or less than the
+        finding speaks for it: rare events that are drawn at other times fit worse. Nor must what the
         measuring chain makes up for by what no sensor needs: it predicts the same, and only differs by how
         probable that is.
         """
@@ -51,7 +55,8 @@ class Candidate:
             return True
         harmless = gain.nats > -_HARM_NATS
         if self.proof_nats > 0.0:
-            return harmless or gain.ci95_nats[1] > 0.0 or gain.gain_db > trifle_db
+            outweighed = gain.nats > -min(self.proof_nats, REPEATED_NATS) + _LEFT_NATS
+            return harmless or outweighed or gain.ci95_nats[1] > 0.0 or gain.gain_db > trifle_db
         return harmless and bool(getattr(self.extension.cause, "of_chain", False))
 
     @property

@@ -35,6 +35,7 @@ _STEPS = 6
 _HEIGHTS = np.geomspace(1.0, 300.0, 24)  # in standard deviations of a line in noise
 _CONVINCING = 14.0  # nats: one of a million sound machines
 _EACH = 5.0  # nats of two records at least, so that no order that swells in one record is hum
+_HEIGHT_ERROR = 0.15  # heights are tried a quarter apart
 _OVER = 2.0  # times the highest line beside it
 
 
@@ -67,8 +68,10 @@ class HumLines:
 
 def hum_in_all(
     context: Context, channel: str, supplies_hz: Sequence[float]
-) -> tuple[float, float, dict[int, float]] | None:
-    """Frequency of the supply, its standard deviation, and amplitudes by multiple; None where no hum shows.
+) -> tuple[float, float, dict[int, float], float] | None:
+    """Frequency of the supply, its standard deviation, amplitudes by multiple, and that of the first.
+
+    None where no hum shows.
 
     Parameters
     ----------
@@ -95,7 +98,7 @@ def hum_in_all(
         found = _at_supply(looks, supply)
         if found is not None and (best is None or found[0] > best[0]):
             best = found
-    return None if best is None else best[1:]
+    return None if best is None else (*best[1:], _HEIGHT_ERROR * best[3][1])
 
 
 def _at_supply(

@@ -205,6 +205,13 @@ class SlowPart:
         solved, _ = _sine(self._turning(frequency_hz), weight, orders, rest)
         return float(np.hypot(*solved))
 
+    def amplitude_std(self, frequency_hz: float, without_orders: Array) -> float:
+        """Standard deviation of `amplitude`, by what lies beside the line and by the orders near it."""
+        noise = self.line_noise(frequency_hz, without_orders)
+        found, information = self.sine(frequency_hz, noise)
+        along = found / max(float(np.hypot(*found)), 1e-300)
+        return math.sqrt(float(along @ np.linalg.pinv(information) @ along))
+
     def sine(self, frequency_hz: float, noise: float) -> tuple[Array, Array]:
         """Amplitudes of cosine and sine beside the shafts' orders, and the inverse of their covariance.
 

@@ -56,11 +56,15 @@ _LARGEST_PART = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Hum:
-    """Supply lines of one channel: frequency with its standard deviation, amplitude (peak) by order."""
+    """Supply lines of one channel: frequency with its standard deviation, amplitude (peak) by order.
+
+    `amplitude_std` is that of the first: beside an order it may be half of it.
+    """
 
     frequency_hz: float
     frequency_std_hz: float
     amplitude: Mapping[int, float]
+    amplitude_std: float = 0.0
 
 
 def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum | None:
@@ -124,7 +128,7 @@ def find_hum(slow: SlowPart, known: MachineLines, supply_hz: float = 0.0) -> Hum
     amplitude = {k: slow.amplitude(k * frequency) for k in orders}
     # The other orders are told in parts of the first, which must not vanish for that.
     amplitude[1] = max(amplitude[1], max(amplitude.values()) / _LARGEST_PART)
-    return Hum(frequency, std, amplitude)
+    return Hum(frequency, std, amplitude, slow.amplitude_std(frequency, samples))
 
 
 def _is_free(
@@ -212,7 +216,7 @@ class MainsInterference:
         parts = {k: a / hum.amplitude[1] for k, a in hum.amplitude.items() if k > 1}
         start: dict[str, float | str] = {
             "amplitude_m_s2": hum.amplitude[1],
-            "std:amplitude_m_s2": _AMPLITUDE_ERROR * hum.amplitude[1],
+            "std:amplitude_m_s2": math.hypot(_AMPLITUDE_ERROR * hum.amplitude[1], hum.amplitude_std),
             "frequency_hz": hum.frequency_hz,
             "std:frequency_hz": hum.frequency_std_hz,
         }
