@@ -20,6 +20,7 @@ from gearsim_twin.fit import Fitted, judged
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.needed import gain_between, needed, settled
 from gearsim_twin.proof import with_proofs
+from gearsim_twin.refine import refined
 from gearsim_twin.screen import Screened, first_guesses, most_hopeful, screen
 from gearsim_twin.settings import Settings
 from gearsim_twin.workbench import Trial, Workbench
@@ -128,7 +129,20 @@ def select(
         if search.spent():
             break
     yard, current, choices = certain
+    if choices:
+        tell("fitting the whole model to the end")
+        current, choices = _to_the_end(search, yard, current, choices)
     return Selection(tuned, current, tuple(choices), tuple(rounds), yard)
+
+
+def _to_the_end(
+    search: _Search, yard: Yardstick, current: Fitted, choices: list[Choice]
+) -> tuple[Fitted, list[Choice]]:
+    """The chosen model at its best, its causes with their gains there."""
+    best = refined(search.bench, yard, current, search.settings.most_refining)
+    same, again = needed(search.bench, yard, search.settings, best, choices)
+    # What convinced before a better fit is not dropped for one.
+    return (same, again) if len(again) == len(choices) else (best, choices)
 
 
 def _left_over(done: Round, choices: list[Choice], settings: Settings) -> bool:

@@ -23,6 +23,8 @@ class Settings:
     most_simulations : int
         Simulations of a record that a search may cost; what is not tried for that is told. Counted, not
         timed, so that a verdict does not depend on how busy the computer is.
+    most_refining : int
+        Simulations of a record for the last fit of the chosen model.
     most_channels : int
         Channels that the search looks at, those that differ most; all count in the final scores.
     most_records : int
@@ -55,6 +57,7 @@ class Settings:
     fits: int = 4
     most_guesses: int = 32
     most_simulations: int = 160
+    most_refining: int = 60
     most_channels: int = 3
     most_records: int = 3
     worth_fitting_nats: float = 1.0
