@@ -76,11 +76,27 @@ def test_lines_that_the_diagnosis_calls_a_fault_twice_prove_more_than_weak_ones(
         ]
 
     monkeypatch.setattr(spalls, "candidates", shown)
+    monkeypatch.setattr(spalls, "_errs_db", lambda _: 1.0)
     assert spalls.seen_again("b", "outer_race", [True], [True]) == spalls.FAULT_NATS
     for pair in (([True], [False]), ([False], [True])):
         assert spalls.seen_again("b", "outer_race", *pair) == spalls.REPEATED_NATS
     assert spalls.FAULT_NATS > 2 * spalls.REPEATED_NATS
     assert spalls.seen_again("b", "outer_race", [True], []) == 0.0
+    # Of a model whose lines are wrong by more than that weak ones prove nothing.
+    monkeypatch.setattr(spalls, "_errs_db", lambda _: 6.0)
+    assert spalls.seen_again("b", "outer_race", [True], [True]) == spalls.FAULT_NATS
+    assert spalls.seen_again("b", "outer_race", [False], [False]) == 0.0
+
+
+def test_how_wrong_lines_are_is_told_by_those_that_no_cause_is_asked_about():
+    kinds = ["line"] * 4 + ["tone", "passage", "ratio"]
+    places = [SimpleNamespace(domain="orders", kind=kind) for kind in kinds]
+    places.append(SimpleNamespace(domain="psd", kind="band"))
+    difference = np.array([5.0, -6.0, 7.0, -8.0, 40.0, 40.0, 40.0, 40.0])
+    one = SimpleNamespace(places=places, difference_db=difference, counted=np.ones(8, dtype=bool))
+    assert spalls._errs_db(SimpleNamespace(comparison=(one,))) == pytest.approx(6.5)
+    few = SimpleNamespace(places=places[:2], difference_db=difference[:2], counted=np.ones(2, dtype=bool))
+    assert spalls._errs_db(SimpleNamespace(comparison=(few,))) == 0.0
 
 
 def _candidate(name, proof, thing="", confused=()):

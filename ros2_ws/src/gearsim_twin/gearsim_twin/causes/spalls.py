@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gearsim_dsp.judges.bearing import ALARM_PROBABILITY
 from gearsim_twin.causes.bearing_model import alike, bearings_of, has_defect, seat_of
 from gearsim_twin.causes.bearing_signs import Sign, size_of, unexplained_signs
@@ -42,6 +44,9 @@ FAULT_NATS = min(-2.0 * math.log(ALARM_PROBABILITY), 15.0)
 """For lines that the diagnosis calls a fault in records for training and in those held out: its false alarms
 are independent there, but a machine beside may show such lines once in some millions of cases."""
 _ALIKE = 0.01  # slip changes from load to load by less
+# Of a model that has a tenth of a line's power or less; tones and passages are what is asked about.
+_RIGHT_DB, _FEWEST_LINES = 4.0, 4
+_NO_LINES = ("tone", "passage", "ratio")
 _FAR_LOG = 0.5  # a width by events that is further from the usual one has that as a second guess
 
 
@@ -75,9 +80,12 @@ def seen_again(component: str, fault: str, context: Context, heldout: Context) -
     structure the model has not must not outweigh that.
     """
     own = [sign for _, sign in candidates(context, fault, absent=True) if sign.component == component]
+    # Sound bearings pass their elements audibly, and a real spectrum is full of lines: that the model lacks
+    # weak ones says as little as its other lines are right.
+    right = _errs_db(context) < _RIGHT_DB
     if own and own[0].run is not None:
         # Found by as much as the diagnosis asks for, and again by as much as counts in itself.
-        return FAULT_NATS if shown_again(own[0], heldout) else 0.0
+        return FAULT_NATS if right and shown_again(own[0], heldout) else 0.0
     found: list[Sign] = []
     for each in (context, heldout):
         signs = candidates(each, fault, absent=True)
@@ -87,7 +95,20 @@ def seen_again(component: str, fault: str, context: Context, heldout: Context) -
         found.append(mine[0])
     if abs(found[1].found_order / found[0].found_order - 1.0) >= _ALIKE:
         return 0.0
-    return FAULT_NATS if all(sign.is_fault for sign in found) else REPEATED_NATS
+    if all(sign.is_fault for sign in found):
+        return FAULT_NATS
+    return REPEATED_NATS if right else 0.0
+
+
+def _errs_db(context: Context) -> float:
+    """By how much lines of shafts and races are wrong in the model, dB (median); 0 where nothing tells."""
+    found = [
+        abs(float(one.difference_db[k]))
+        for one in context.comparison
+        for k, place in enumerate(one.places)
+        if one.counted[k] and place.domain == "orders" and place.kind not in _NO_LINES
+    ]
+    return float(np.median(found)) if len(found) >= _FEWEST_LINES else 0.0
 
 
 def known_width_m(context: Context, record: int, sign: Sign) -> float | None:
