@@ -33,6 +33,7 @@ _LOW = 3
 _REACH = 0.001  # of the supply's frequency, and steps on each side
 _STEPS = 6
 _HEIGHTS = np.geomspace(1.0, 300.0, 24)  # in standard deviations of a line in noise
+_LINE = 6.0  # evidence of a line that may be hum's first
 _CONVINCING = 14.0  # nats: one of a million sound machines
 _EACH = 5.0  # nats of two records at least, so that no order that swells in one record is hum
 _HEIGHT_ERROR = 0.15  # heights are tried a quarter apart
@@ -94,11 +95,20 @@ def hum_in_all(
             for k in range(1, _LOW + 1)
         ):
             continue
+        if not all(_shows(view, channel, supply) for view in views):
+            continue
         looks = [HumLines.of(view, channel, supply, _ORDERS) for view in views]
         found = _at_supply(looks, supply)
         if found is not None and (best is None or found[0] > best[0]):
             best = found
     return None if best is None else (*best[1:], _HEIGHT_ERROR * best[3][1])
+
+
+def _shows(view: View, channel: str, supply_hz: float) -> bool:
+    """Whether there is a line at all, of order or supply; to look closer costs a hundred times as much."""
+    slow = slow_part(view, channel, _TOP_HZ)
+    spectrum = line_spectrum(slow.signal, slow.sample_rate_hz)
+    return spectrum is not None and float(spectrum.at(np.array([supply_hz]))[0]) > _LINE
 
 
 def _at_supply(
