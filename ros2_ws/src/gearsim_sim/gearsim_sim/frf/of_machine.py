@@ -18,11 +18,12 @@ def machine_responses(params: Any) -> CasingResponses:
         If there is no casing or there are no responses, or they are of another casing than the reduced one.
     """
     named: str | None = getattr(params, "responses", None)
+    key = getattr(params, "responses_key", "casing.responses")
     if named is None:
-        expected = "a model in a flexible casing, such as cb146, whose machine names casing.responses"
+        expected = f"a model in a flexible casing, such as cb146, whose machine names {key}"
         raise InputError("sensors.accelerometers", "path", "frf", expected)
     found = find_responses(named)
     if not found.belongs_to(params.casing):
         expected = f"those of the reduced casing, {params.casing.name}; `gearsim casing responses` makes them"
-        raise InputError(params.where, "casing.responses", named, expected)
+        raise InputError(params.where, key, named, expected)
     return found

@@ -25,7 +25,9 @@ from gearsim_sim.model.casing.reduced import ReducedCasing
 from gearsim_sim.model.on_casing import own_modes
 
 Array = NDArray[np.float64]
-AXES = {"x": "ux", "y": "uy"}
+AXES = {"x": "ux", "y": "uy", "rz": "rz"}
+# A bearing passes no torque about its shaft on to its seat; a ring gear does. Names are those of the masters.
+_TURNED = ("ring",)
 # The same finite elements, however reduced, give the same static compliance of the bores to 1e-9 of the
 # largest; a hundredth in the thickness of one plate changes it by more than this.
 _SAME = 1e-6
@@ -33,14 +35,14 @@ _SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class CasingResponses:
-    """Accelerations of sites [m/s^2] over forces on the bearing seats [N].
+    """Accelerations of sites [m/s^2] over forces on the seats [N], and torques [N m].
 
     Attributes
     ----------
     name : str
         Of the casing.
     inputs : tuple of str
-        Seat and axis of each force, such as `b3_y`.
+        Seat and axis of each force, such as `b3_y`, or torque, `ring_rz`.
     sites : tuple of str
         Places on the casing, each in one direction.
     omega, ratios : ndarray, shape (modes,)
@@ -48,9 +50,9 @@ class CasingResponses:
     input_shapes, site_shapes : ndarray, shape (inputs, modes), (sites, modes)
         Motion in each mode of unit modal mass.
     residual : ndarray, shape (sites, inputs)
-        Displacement per force [m/N] that follows without delay.
+        Displacement per force [m/N] (torque [1/N]) that follows without delay.
     compliance : ndarray, shape (inputs, inputs)
-        Static displacement of the seats per force [m/N]: tells one casing from another.
+        Static displacement of the seats per force [m/N] (turns, torques): tells one casing from another.
     valid_hz : float
         Up to here the modes are those of the full model.
     """
@@ -105,12 +107,15 @@ class CasingResponses:
         if not set(self.inputs) <= set(seats(casing)):
             return False
         own = static_compliance(casing, self.inputs)
-        return bool(np.all(np.abs(own - self.compliance) <= _SAME * np.abs(np.diag(self.compliance)).max()))
+        size = np.sqrt(np.abs(np.diag(self.compliance)))  # turns and displacements each by their own size
+        return bool(np.all(np.abs(own - self.compliance) <= _SAME * np.outer(size, size)))
 
 
 def seats(casing: ReducedCasing) -> tuple[str, ...]:
-    """Names of the forces that the masters of a casing can take: each in x and y."""
-    return tuple(f"{master}_{axis}" for master in casing.masters for axis in AXES)
+    """Names of what the masters of a casing can take: a force in x and in y, a ring gear's a torque, too."""
+    return tuple(
+        f"{master}_{axis}" for master in casing.masters for axis in AXES if axis != "rz" or master in _TURNED
+    )
 
 
 def _rows(casing: ReducedCasing, inputs: Sequence[str]) -> list[int]:
@@ -119,7 +124,7 @@ def _rows(casing: ReducedCasing, inputs: Sequence[str]) -> list[int]:
 
 
 def static_compliance(casing: ReducedCasing, inputs: Sequence[str]) -> Array:
-    """Displacement of the seats per static force on them [m/N], shape (inputs, inputs)."""
+    """Displacement (turn) of the seats per static force (torque) on them, shape (inputs, inputs)."""
     omega, shapes = casing.own_modes
     moved = shapes[_rows(casing, inputs)] / omega
     return np.asarray(moved @ moved.T)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import read_machine_file
 from gearsim_sim.model.casing.reduced import ReducedCasing, find_reduced
+from gearsim_sim.params.own_files import beside
 from gearsim_sim.params.parallel import ParallelParams, load_parallel_params
 
 
@@ -72,11 +73,6 @@ def load_casing_gearbox_params(
     if finite and gearbox.model.finite_shafts is None:
         raise InputError(gearbox.where, "finite_shafts", "nothing", "a section with the shafts' dimensions")
 
-    def own(key: str, name: str) -> str:
-        """A file's path is from the folder of what names it."""
-        replaced = overrides is not None and f"casing.{key}" in overrides
-        beside = Path(source) if replaced else read_machine_file(machine)[0]
-        return str(beside.parent / name) if name.endswith(".npz") else name
-
+    own = partial(beside, machine, overrides, source, "casing")
     responses = None if named.responses is None else own("responses", named.responses)
     return CasingGearboxParams(gearbox, find_reduced(own("reduced", named.reduced)), finite, responses)

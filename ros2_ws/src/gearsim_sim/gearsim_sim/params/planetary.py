@@ -155,6 +155,8 @@ class FlexibleCasing(Strict):
 
     reduced: str
     """Name of a shipped reduced casing, or path of one (.npz) from the folder of the file that names it."""
+    responses: str | None = None
+    """Frequency responses of the same casing, by name or path, for accelerometers with `path: frf`."""
     carrier_stiffness_n_per_m: Annotated[float, Si("N/m", ge=0), Field(alias="carrier_stiffness")]
     """Stiffness of the carrier's bearing in the casing, in x and y; 0: it has none."""
     carrier_damping_ns_per_m: Annotated[float, Si("N*s/m", ge=0), Field(alias="carrier_damping")]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from gearsim_io.errors import InputError
-from gearsim_io.machines import read_machine_file
 from gearsim_sim.model.casing.reduced import ReducedCasing, find_reduced
+from gearsim_sim.params.own_files import beside
 from gearsim_sim.params.planetary import FlexibleCasing, PlanetaryParams, load_planetary_params
 
-_NAMED = "flexible_casing.reduced"
+_SECTION = "flexible_casing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +26,16 @@ class PlanetaryCasingParams:
         The stage on the ground.
     casing : ReducedCasing
         What holds its ring and the bearings of sun and carrier.
+    responses : str or None
+        Name or path of its frequency responses.
     """
 
     gearbox: PlanetaryParams
     casing: ReducedCasing
+    responses: str | None = None
+
+    responses_key: ClassVar[str] = f"{_SECTION}.responses"
+    """Where a machine's description names its responses."""
 
     @property
     def where(self) -> str:
@@ -68,8 +75,6 @@ def load_planetary_casing_params(
         raise InputError(gearbox.where, "flexible_casing", "nothing", "a section with a reduced casing")
     if gearbox.model.casing.included:
         raise InputError(gearbox.where, "casing.included", 1, "0: the flexible casing stands in its place")
-    replaced = overrides is not None and _NAMED in overrides
-    beside = Path(source) if replaced else read_machine_file(machine)[0]
-    name = named.reduced
-    own = str(beside.parent / name) if name.endswith(".npz") else name
-    return PlanetaryCasingParams(gearbox, find_reduced(own))
+    own = partial(beside, machine, overrides, source, _SECTION)
+    responses = None if named.responses is None else own("responses", named.responses)
+    return PlanetaryCasingParams(gearbox, find_reduced(own("reduced", named.reduced)), responses)
