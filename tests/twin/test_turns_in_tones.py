@@ -53,8 +53,8 @@ def test_a_high_multiple_of_a_turn_has_one_place_at_all_speeds() -> None:
 
 
 def test_lines_of_a_slow_turn_that_run_into_one_another_are_no_tones() -> None:
-    # 2.13 Hz apart, where windows of 0.7 s tell lines 7 Hz apart.
-    orders = {80: 0.2, 599: 0.1, 600: 0.15, 601: 0.12}
+    # 2.13 Hz apart, where windows of 0.7 s tell lines 7 Hz apart: the top lies between both.
+    orders = {80: 0.2, 600: 0.15, 601: 0.14}
     plan, _ = _shown([_view(2.1391, orders, 3, "unsw_planetary", "carrier")], "unsw_planetary")
     found = [plan.places[k] for k in _tones(plan)]
     assert found
