@@ -188,7 +188,17 @@ def test_an_effect_that_fills_a_domain_is_no_error_of_the_model():
 
 
 def test_few_places_do_not_hide_one_that_differs():
-    places = (*BANDS, *LINES[:2])
+    tones = [replace(line, kind="tone", label="tone") for line in LINES[:2]]
+    places = (*BANDS, *tones)
     level = np.concatenate([np.full(40, 0.2), [9.0, 0.3]])
     (one,) = discrepancies([compare(by_hand(places, level), by_hand(places, 0.0, 0.1))])
-    assert one.places == (LINES[0],)
+    assert one.places == (tones[0],)
+
+
+def test_lines_of_the_machine_itself_are_told_by_what_any_model_errs_by_and_strange_ones_by_this_one():
+    strange = Place("orders", "a", "tone", 411.0, "Hz", 3.0, "tone")
+    own = replace(strange, at=811.0, label="10 x BPFO of bearing_1")
+    level = np.concatenate([np.full(40, 0.1), [5.5, 5.5]])
+    places = (*BANDS, strange, own)
+    found = discrepancies([compare(by_hand(places, level), by_hand(places, 0.0, 1e-9), {})])
+    assert [each.places for each in found] == [(strange,)]

@@ -22,9 +22,8 @@ _LEAST_PART = 0.012
 def numbers_of(fitted: Fitted, number: int) -> tuple[Number, ...]:
     """Parameters of one of a model's causes with their 95 % intervals.
 
-    The posterior is normal in the coordinates of the priors, about the model that was simulated and is written
-    to the file; an interval is mapped to values end by end. What was read off the records has the interval of
-    the reading.
+    The posterior is normal in the coordinates of the priors, about the model that was simulated; an interval
+    is mapped to values end by end. What was read off the records has the interval of the reading.
     """
     model = fitted.trial.model
     extension, own = model.extensions[number], model.own[number]

@@ -43,6 +43,7 @@ _LOWEST_BINS, _WIDEST = 5.0, 0.25
 _MOVES = 0.02
 _ALIKE = 0.03
 _CHANNELS = 2
+_KNOWN = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +228,8 @@ def patterns(
     if (family := _common(lines, family_of)) is not None:
         found.append(f"lines at multiples of {_told(family, speed_hz)} of {channel}")
         lines = [each.without(family) for each in lines]
-    if (spacing := _common(lines, spacing_of)) is not None:
+    spacing = _common(lines, spacing_of)
+    if spacing is not None and not _is_known(spacing / speed_hz, frame):
         found.append(f"lines {_told(spacing, speed_hz)} beside others of {channel}")
     for band in frame.bands_hz if frame.has_orders else ():
         spectra = [[each.envelope_spectra(channel, band) for each in pair] for pair in pairs]
@@ -238,6 +240,12 @@ def patterns(
     short = [[each.time_spectra(channel) for each in pair] for pair in pairs]
     found += [told for band in bands_hz if (told := _band(short, band, channel)) is not None]
     return tuple(found)
+
+
+def _is_known(order: float, frame: Frame) -> bool:
+    """Whether it is the distance of lines that the machine makes itself."""
+    turns = [abs(shaft.ratio) for shaft in frame.machine.shafts] + [family.order for family in frame.families]
+    return any(abs(order - k * turn) < _KNOWN * order for turn in turns for k in (1, 2, 3))
 
 
 def _band(sides: Sequence[Sequence[WindowSpectra]], band: tuple[float, float], channel: str) -> str | None:
