@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from toy_rig import (
@@ -24,6 +25,7 @@ from gearsim_twin.calibrate import Prior, settled_on
 from gearsim_twin.compare.features import Features
 from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.places import Place
+from gearsim_twin.had_before import had_before
 from gearsim_twin.model import Extension, Model
 from gearsim_twin.taught import Taught
 from gearsim_twin.workbench import Workbench
@@ -150,3 +152,16 @@ def test_the_measure_of_a_bench_with_healthy_records_is_sharp_where_they_are():
     noise = yard.noise(yard.residual(trial.levels), trial.levels)
     told = yard.stack.part(bench.training)
     assert np.max(np.sqrt(yard.missed(trial.levels, noise)[told])) < 0.8
+
+
+def test_faults_of_healthy_records_are_told(monkeypatch):
+    signs = {
+        "sound": [],
+        "bad": [SimpleNamespace(fault="outer_race", component="bearing_3", is_fault=True)],
+        "faint": [SimpleNamespace(fault="inner_race", component="bearing_3", is_fault=False)],
+    }
+    monkeypatch.setattr("gearsim_twin.had_before.signs_of", lambda view: signs[view.record.source])
+    views = [SimpleNamespace(record=SimpleNamespace(source=name)) for name in signs]
+    (said,) = had_before(views)
+    assert said.startswith("bad, said to be healthy")
+    assert "outer race of bearing_3" in said

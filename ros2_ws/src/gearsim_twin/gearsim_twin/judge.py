@@ -29,6 +29,7 @@ from gearsim_twin.conclude import Evidence, concluded
 from gearsim_twin.exhibit import exhibit_of
 from gearsim_twin.extended import write_extended
 from gearsim_twin.fit import fit_tuning, judged
+from gearsim_twin.had_before import had_before
 from gearsim_twin.heard import heard
 from gearsim_twin.labels import speed_label
 from gearsim_twin.measuring_chain import measuring_chain
@@ -305,6 +306,7 @@ def _judged(
         settings.seed,
     )
     told_by = [*case.remarks, *(each for view in bench.views for each in view.remarks), *of_healthy]
+    told_by += had_before([bench.views[k] for k in bench.healthy])
     remarks = dict.fromkeys(told_by)
     shared = partial(patterns_of, lambda: context_of(selection.final.trial), bench.search.frame)
     evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label, shared)

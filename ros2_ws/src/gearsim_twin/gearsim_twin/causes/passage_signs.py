@@ -7,7 +7,6 @@ its own lines lie, with the gains of the measuring chain.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -18,10 +17,18 @@ import numpy as np
 from gearsim_dsp.bands import TOP_SHARE
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import FaultFamily, fault_families
-from gearsim_dsp.speed import Phase
 from gearsim_twin.causes.bearing_signs import Sign
 from gearsim_twin.causes.cause import REPEATED_NATS
-from gearsim_twin.compare.passages import Found, LongLines, Shown, best_comb, found_all, long_lines, shown
+from gearsim_twin.compare.passages import (
+    ANGLE_MARKS,
+    Found,
+    LongLines,
+    Shown,
+    best_comb,
+    found_all,
+    long_lines,
+    shown,
+)
 
 if TYPE_CHECKING:
     from gearsim_twin.causes.context import Context
@@ -136,7 +143,10 @@ def _lacks(context: Context, run: _Run, measured: Sequence[Shown], *, absent: bo
     most = (_LACKING if absent else _AS_STRONG) * sum(one.power for one in measured)
     plain = gain * sum(_of_model(view, run) for view in context.simulated_views)
     model = gain * sum(_of_model(view, run) for view in views)
-    return bool(model < most and plain < noise)
+    # What the healthy machine showed is no cause's.
+    before = sum(_of_model(view, run) for view in context.healthy_views)
+    power = sum(one.power for one in measured)
+    return bool(model < most and plain < noise and before <= _AS_STRONG * power)
 
 
 def _of_model(view: View, run: _Run) -> float:
@@ -220,11 +230,8 @@ def _made(view: View, channel: str) -> LongLines | None:
     rate = view.record.sample_rate_hz
     signal = view.signal(channel)
     phase = view.phase
-    if phase is None:
-        if not (math.isfinite(view.speed_hz) and view.speed_hz > 0):
-            return None
-        end = signal.size - 1.0
-        phase = Phase(np.array([0.0, end]), np.array([0.0, end]) * view.speed_hz / rate)
+    if phase is None or view.source not in ANGLE_MARKS:
+        return None
     if not (np.all(np.isfinite(signal)) and np.ptp(signal) > 0):
         return None
     return long_lines(signal, phase, rate, TOP_SHARE * rate, view.machine)

@@ -44,6 +44,9 @@ FAULT_NATS = min(-2.0 * math.log(ALARM_PROBABILITY), 15.0)
 """For lines that the diagnosis calls a fault in records for training and in those held out: its false alarms
 are independent there, but a machine beside may show such lines once in some millions of cases."""
 _ALIKE = 0.01  # slip changes from load to load by less
+# How lines of a fault are called, and how far they must stand out of a healthy record to be no part of it.
+_LINES_OF = {"outer_race": "BPFO", "inner_race": "BPFI", "rolling_element": "BSF"}
+_NEWS_Z = 4.0
 # Of a model that has a tenth of a line's power or less; tones and passages are what is asked about.
 _RIGHT_DB, _FEWEST_LINES = 4.0, 4
 _NO_LINES = ("tone", "passage", "ratio")
@@ -79,6 +82,8 @@ def seen_again(component: str, fault: str, context: Context, heldout: Context) -
     Lines that the diagnosis would call a fault in both are as sure as its alarms: levels of a rig whose
     structure the model has not must not outweigh that.
     """
+    if not (_is_news(context, fault) and _is_news(heldout, fault)):
+        return 0.0
     own = [sign for _, sign in candidates(context, fault, absent=True) if sign.component == component]
     # Sound bearings pass their elements audibly, and a real spectrum is full of lines: that the model lacks
     # weak ones says as little as its other lines are right.
@@ -98,6 +103,17 @@ def seen_again(component: str, fault: str, context: Context, heldout: Context) -
     if all(sign.is_fault for sign in found):
         return FAULT_NATS
     return REPEATED_NATS if right else 0.0
+
+
+def _is_news(context: Context, fault: str) -> bool:
+    """Whether lines of such a fault stand out of what healthy records show, if there are any."""
+    if not context.healthy_views:
+        return True
+    return any(
+        _LINES_OF[fault] in each.place.label and each.z >= _NEWS_Z
+        for domain in ("envelope", "orders", "cyclic")
+        for each in context.differences(domain)
+    )
 
 
 def _errs_db(context: Context) -> float:
