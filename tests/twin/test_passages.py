@@ -82,7 +82,7 @@ def test_lines_of_the_clearest_family_are_no_evidence_for_another():
     assert [fault for fault, _ in found(ringing(INNER.order, 0.9) + noise(6, 0.1))] == ["inner_race"]
 
 
-def plan_of(signals):
+def plan_of(signals, source="tacho"):
     """Places for some records, and a way to read them."""
     record = SimpleNamespace(sample_rate_hz=RATE_HZ, channels=("a",))
     frame = SimpleNamespace(
@@ -103,7 +103,7 @@ def plan_of(signals):
     )
     materials = [
         SimpleNamespace(
-            view=SimpleNamespace(record=record),
+            view=SimpleNamespace(record=record, source=source),
             frame=frame,
             phase=phase(),
             rate_hz=RATE_HZ,
@@ -122,6 +122,8 @@ def test_the_level_of_a_run_is_that_of_its_lines():
     lines = sum(amplitude * np.cos(2 * np.pi * k * OUTER.order * turns + k * k) for k in range(11, 27))
     wanted, (material,) = plan_of([lines + noise(7, 1.0)])
     assert wanted
+    # High multiples of a turn are told by marks alone.
+    assert not plan_of([lines + noise(7, 1.0)], "estimated")[0]
     assert all(place.kind == KIND and place.label.endswith(OUTER.label) for place in wanted)
     levels = measure(material, wanted)
     # Four cosines, and white noise of the density 2 / rate in the bandwidth of the lines.

@@ -21,6 +21,7 @@ from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.lines import comb_levels
 from gearsim_twin.compare.material import Material
 from gearsim_twin.compare.passages import (
+    ANGLE_MARKS,
     Found,
     LongLines,
     best_comb,
@@ -156,7 +157,7 @@ def _lines(material: Material, channel: str) -> LongLines | None:
         phase = material.phase
         material._kept[key] = (
             None
-            if phase is None
+            if phase is None or material.view.source not in ANGLE_MARKS
             else long_lines(
                 material.samples(channel),
                 phase,

@@ -5,7 +5,8 @@ narrow resonance under loud noise are lost there, while each of their harmonics 
 of the noise of one line of the whole record, as long as elements do not slip at random. So combs k f, with
 the sidebands next to them, are sought over the angle in windows as long as records, in runs of neighbouring
 harmonics. A fundamental is told there to a part of a line over k. What turns of shafts and lines of clearer
-families may bring is left out. Gears with planets bring lines everywhere: there nothing is looked for.
+families may bring is left out. Without marks of the angle, which alone tell high multiples of a turn, nothing
+is looked for, nor where there are planets, which bring lines everywhere.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from gearsim_io.nameplate import Machine
 from gearsim_twin.compare.windows import WindowSpectra, cut, spectra_of
 
 __all__ = [
+    "ANGLE_MARKS",
     "LEAST_NATS",
     "FamilyLike",
     "Found",
@@ -41,6 +43,8 @@ __all__ = [
     "shown",
 ]
 
+ANGLE_MARKS = ("tacho", "encoder")
+"""Sources of an angle that tells the multiples of a turn from lines next to them."""
 LEAST_NATS = math.log(1e4)
 """What a comb must be improbable by, all looks counted."""
 
