@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from toy_rig import (
     AT,
     LOADS,
@@ -22,6 +23,7 @@ from toy_rig import (
 from toy_rig import CAUSES as TOYS
 
 from gearsim_twin.calibrate import Prior, settled_on
+from gearsim_twin.causes import spalls
 from gearsim_twin.compare.features import Features
 from gearsim_twin.compare.levels import Levels
 from gearsim_twin.compare.places import Place
@@ -165,3 +167,13 @@ def test_faults_of_healthy_records_are_told(monkeypatch):
     (said,) = had_before(views)
     assert said.startswith("bad, said to be healthy")
     assert "outer race of bearing_3" in said
+
+
+@pytest.mark.parametrize(("z", "nats"), [(1.0, 0.0), (9.0, spalls.FAULT_NATS)])
+def test_lines_that_healthy_records_have_prove_nothing(monkeypatch, z: float, nats: float):
+    sign = SimpleNamespace(component="bearing_3", is_fault=True, run=None, found_order=3.2)
+    monkeypatch.setattr(spalls, "candidates", lambda *_, **__: [(0, sign)])
+    monkeypatch.setattr(spalls, "_errs_db", lambda _: 0.0)
+    line = SimpleNamespace(place=SimpleNamespace(label="2 x BPFO of bearing_3"), z=z)
+    looked_at = SimpleNamespace(healthy_views=(None,), differences=lambda _: (line,))
+    assert spalls.seen_again("bearing_3", "outer_race", looked_at, looked_at) == nats
