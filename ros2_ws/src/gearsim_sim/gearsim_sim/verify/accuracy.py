@@ -31,9 +31,13 @@ LIMIT = 1e-3
 # order, and 1e-3 needs 8 steps per sample on the planetary stage.
 RATTLING = {"gear_backlash": 4e-3}
 HEALTHY = "healthy"
-# In a flexible casing, where DOP853 takes long: a fault of a bearing, whose force the casing feels, and of
-# teeth.
-_IN_CASING = ("outer_race_spall", "gear_tooth_crack", "planet_tooth_crack")
+# In a flexible casing, where DOP853 takes long: spalls of bearings, whose forces the casing feels, and faults
+# of teeth and planets.
+_IN_CASING = (
+    *("outer_race_spall", "inner_race_spall", "rolling_element_spall", "wide_spall"),
+    *("gear_tooth_crack", "gear_tooth_spall"),
+    *("planet_tooth_crack", "planet_tooth_spall", "planet_position_error", "unequal_load_sharing"),
+)
 _PEAK_S = 0.006  # where in the window the fault does most
 _BINS_S = 0.002
 _EVERY = 3  # step that is compared
