@@ -144,6 +144,7 @@ def test_lines_of_a_spall_are_proven_where_both_sets_of_records_have_them_in_one
 
     monkeypatch.setattr(spalls, "candidates", found)
     monkeypatch.setattr(spalls, "_errs_db", lambda _: 0.0)
+    monkeypatch.setattr(spalls, "_is_news", lambda *_: True)
     assert spalls.seen_again("b", "outer_race", [3.24], [3.25]) == REPEATED_NATS
     for training, heldout in (([3.24], []), ([], [3.24]), ([3.24], [3.30])):
         assert spalls.seen_again("b", "outer_race", training, heldout) == 0.0

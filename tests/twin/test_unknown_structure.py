@@ -77,6 +77,7 @@ def test_lines_that_the_diagnosis_calls_a_fault_twice_prove_more_than_weak_ones(
 
     monkeypatch.setattr(spalls, "candidates", shown)
     monkeypatch.setattr(spalls, "_errs_db", lambda _: 1.0)
+    monkeypatch.setattr(spalls, "_is_news", lambda *_: True)
     assert spalls.seen_again("b", "outer_race", [True], [True]) == spalls.FAULT_NATS
     for pair in (([True], [False]), ([False], [True])):
         assert spalls.seen_again("b", "outer_race", *pair) == spalls.REPEATED_NATS
