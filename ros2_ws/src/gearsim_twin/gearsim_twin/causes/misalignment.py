@@ -70,12 +70,15 @@ class Misalignment:
         both = matches(
             context, tried, self._both, _OFFSET_M, _OFFSETS_M, angle="any", power=_BETWEEN, top=_TOP
         )[:1]
-        shafts = [match.part for match in both]
+        # An angle alone, of which each shaft would need as many again, is tried in every other direction.
+        shafts = [match.part for match in both] or tried[::2]
         # On a shaft a coupling may stand at any angle.
-        offset = matches(context, shafts, self._offset, _OFFSET_M, _OFFSETS_M, angle="any", top=_TOP)
+        offset = matches(
+            context, shafts[: len(both)], self._offset, _OFFSET_M, _OFFSETS_M, angle="any", top=_TOP
+        )
         angle = matches(
             context,
-            shafts or tried,
+            shafts,
             self._angle,
             _ANGLE_RAD,
             _ANGLES_RAD,
