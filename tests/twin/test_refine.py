@@ -35,8 +35,8 @@ def test_chance_is_not_taken_for_a_slope():
     base = trial(np.zeros(2), np.zeros(400))
     found = slopes_among(base, [trial(u, level) for u, level in zip(at, real + noise, strict=True)])
     assert np.mean(found[:, 0]) == pytest.approx(8.0, abs=0.8)
-    # One difference over 0.25 of unit noise on both sides would give 1.4 / 0.25 = 5.7 there, least squares alone
-    # 1 / (0.17 sqrt(20)) = 1.3; shrunk by their own noise they are lower by sqrt(2) or more.
+    # One difference over 0.25 of unit noise on both sides would give 1.4 / 0.25 = 5.7 there, least squares
+    # alone 1 / (0.17 sqrt(20)) = 1.3; shrunk by their own noise they are lower by sqrt(2) or more.
     assert np.sqrt(np.mean(found[:, 1] ** 2)) < 1.0
 
 
