@@ -185,6 +185,9 @@ def test_small_differences_count_where_the_machine_is_known():
     noise = yard.noise(yard.residual(predicted), predicted)
     assert noise.tau_db[0] == pytest.approx(1.0, rel=0.4)
     assert noise.repeat[0] == pytest.approx(1.0, rel=0.5)
+    # Each place counts once, beside what is known of tau and repeatability beforehand (two deviations).
+    total = float(yard.loglike(yard.residual(predicted), predicted, noise).sum())
+    assert total - 4.0 <= noise.loglike[0] <= total + 1e-6
     cost = []
     for k in (3, 100):
         off, near = (np.where(np.arange(120) == k, x, residual) for x in (1.0, 0.0))
