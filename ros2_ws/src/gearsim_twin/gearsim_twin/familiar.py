@@ -213,7 +213,8 @@ class _Rows:
             side[k] = np.nan_to_num(values)
         total = np.ones(level.size)
         total[k] = np.maximum(_power(level[k]) * after, 1e-300)
-        open_db = np.nan_to_num(self._scattered(*sides, total))
+        machine, model, change = sides
+        open_db = np.nan_to_num(self._scattered(machine, model, change, total))
         return level, np.where(self.shape & angled, np.minimum(open_db, _MOST_OPEN_DB), scatter)
 
 

@@ -292,8 +292,8 @@ def _judged(
     context_of, again = (partial(look, work, prior) for look in (bench.context, bench.heldout))
     selection = select(work, yard, tuned, others, context_of, settings, tell, _nothing_left, again)
     tell("scoring on held-out records")
-    whole = work if bench.search is bench.plan and len(told) == train else None
-    if whole is None:
+    whole = work
+    if bench.search is not bench.plan or len(told) != train:
         taught = bench.taught(prior, bench.plan) if work.taught is not None else None
         whole = bench.workbench(range(train + held), train, bench.plan, taught)
     records = (*whole.training, *whole.holdout)
@@ -305,11 +305,9 @@ def _judged(
         {name: [trial.features[k] for k in whole.holdout] for name, trial in zip(names, trials, strict=True)},
         settings.seed,
     )
-    told_by = [*case.remarks, *(each for view in bench.views for each in view.remarks), *of_healthy]
-    told_by += had_before([bench.views[k] for k in bench.healthy])
-    remarks = dict.fromkeys(told_by)
+    remarks = _remarks(bench, of_healthy)
     shared = partial(patterns_of, lambda: context_of(selection.final.trial), bench.search.frame)
-    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, tuple(remarks), label, shared)
+    evidence = Evidence(whole, selection, trials[1], trials[2], prior, scores, remarks, label, shared)
     verdict = concluded(evidence)
     if show:
         tell("gathering what is shown")
@@ -318,6 +316,13 @@ def _judged(
         return verdict
     content = selection.final.trial.model.content(whole.nominal[0])
     return verdict.written(write_extended(out, content, verdict.comments()))
+
+
+def _remarks(bench: Bench, of_healthy: tuple[str, ...]) -> tuple[str, ...]:
+    """What is to be said of the records, each once."""
+    said = [*bench.case.remarks, *(each for view in bench.views for each in view.remarks), *of_healthy]
+    said += had_before([bench.views[k] for k in bench.healthy])
+    return tuple(dict.fromkeys(said))
 
 
 def _nothing_left(context: Context) -> bool:

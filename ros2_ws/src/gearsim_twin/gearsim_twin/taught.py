@@ -35,8 +35,11 @@ REPEAT_DB = {
     "transient": 0.4,
     "tones": 0.8,
 }
-"""What runs of one machine differ by beyond sampling, where no line is beside a place: three runs of
-each of five sound machines of the blind tests (speed and load within 0.3 %) differed by 0 to 0.8 times that."""
+"""What runs of one machine differ by beyond sampling, where no line is beside a place.
+
+Three runs of each of five sound machines of the blind tests (speed and load within 0.3 %) differed by 0 to
+0.8 times as much.
+"""
 # Of what the model says that other conditions do, so much is not believed.
 _DOUBT = 0.5
 # Differences among healthy records that are as much as the assumption.
