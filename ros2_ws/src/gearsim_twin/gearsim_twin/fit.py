@@ -17,7 +17,14 @@ from gearsim_twin.workbench import Trial, Workbench
 
 __all__ = ["Fitted", "fit_tuning", "held", "judged", "slopes_of"]
 
-_STEPS = 4
+_STEPS = 6
+# Lengths of a step that are tried at one go; shorter ones change nothing, lesser gains are not worth a step.
+_PARTS = (1.0, 0.35)
+_SHORT, _WORTH = 0.1, 0.25
+_ELSEWHERE = 0.5  # standard deviations of the prior
+# Where else to begin, what makes that worth it in nats, and from which mean square in standard deviations on.
+_LOOKS, _HIGHER = (-1.5, -0.75, 0.75, 1.5), 1.0
+_POOR, _SMOOTH_DB = 1.5, 1.0
 # Longest step, in standard deviations of the prior: beyond, levels are no longer linear in the parameters.
 _LONGEST = 1.5
 _TUNING_STEP = 0.5
@@ -59,21 +66,65 @@ def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
         # The healthy machine is known by its records, whatever the knobs are.
         (trial,) = bench.trials([model])
         return judged(yard, trial, np.zeros((yard.stack.size, start.size)))
-    steps = np.where(start > 0, -_TUNING_STEP, _TUNING_STEP) * np.eye(start.size)
-    trials = bench.trials([model, *(model.at(start + step) for step in steps)])
-    slopes = slopes_of(trials[0], trials[1:], np.diag(steps))
-    best, value = trials[0], yard.value(trials[0].levels, start)
-    for _ in range(_STEPS - 1):
+    best, slopes = _climbed(bench, yard, bench.trials([model])[0])
+    if _poor(yard, best):
+        # Likelihoods of resonances have several hills: a model that tells little is on a low one.
+        here = np.array(best.model.knobs)
+        looks = [here + far * row for row in np.eye(here.size) for far in _LOOKS]
+        other = max(bench.trials([model.at(at) for at in looks]), key=lambda trial: _value(yard, trial))
+        if _value(yard, other) > _value(yard, best) + _HIGHER:
+            best, slopes = _climbed(bench, yard, other)
+    return judged(yard, best, slopes)
+
+
+def _climbed(bench: Workbench, yard: Yardstick, first: Trial) -> tuple[Trial, Array]:
+    """The best trial that steps from the first one lead to, with the slopes of the knobs."""
+    best, slopes = _with_slopes(bench, first)
+    value, taken_at = _value(yard, best), np.array(best.model.knobs)
+    for _ in range(_STEPS):
         here = np.array(best.model.knobs)
         step = held(yard.posterior(best.levels, slopes, here).coordinates - here)
-        if not step.size or float(np.max(np.abs(step))) < 0.1:
+        if not step.size or float(np.max(np.abs(step))) < _SHORT:
             break
-        (trial,) = bench.trials([model.at(here + step)])
-        found = yard.value(trial.levels, here + step)
-        if found <= value:
+        trials = bench.trials([best.model.at(here + part * step) for part in _PARTS])
+        values = [_value(yard, trial) for trial in trials]
+        k = int(np.argmax(values))
+        if values[k] > value + _WORTH:
+            best, value = trials[k], values[k]
+        elif _far(here, taken_at):
+            # Slopes from where it began may mislead by now: they are taken anew before that is the end.
+            (best, slopes), taken_at = _with_slopes(bench, best), here
+        else:
             break
-        best, value = trial, found
-    return judged(yard, best, slopes)
+    if _far(np.array(best.model.knobs), taken_at):
+        best, slopes = _with_slopes(bench, best)
+    return best, slopes
+
+
+def _value(yard: Yardstick, trial: Trial) -> float:
+    return yard.value(trial.levels, np.array(trial.model.knobs, dtype=np.float64))
+
+
+def _poor(yard: Yardstick, trial: Trial) -> bool:
+    """Whether levels differ by more than models of this kind are thought to err."""
+    residual = yard.residual(trial.levels)
+    told = np.isfinite(residual)
+    missed = yard.tau_median_db[yard.stack.domain] ** 2 + _SMOOTH_DB**2
+    z2 = residual[told] ** 2 / (yard.variance(trial.levels) + missed)[told]
+    return bool(z2.size) and float(np.mean(z2)) > _POOR
+
+
+def _far(here: Array, other: Array) -> bool:
+    """Whether slopes are to be expected to differ between two places."""
+    return float(np.max(np.abs(here - other), initial=0.0)) > _ELSEWHERE
+
+
+def _with_slopes(bench: Workbench, trial: Trial) -> tuple[Trial, Array]:
+    """A trial and the slopes of its knobs there, each taken towards the middle of what it may be."""
+    here = np.array(trial.model.knobs, dtype=np.float64)
+    steps = np.where(here > 0, -_TUNING_STEP, _TUNING_STEP) * np.eye(here.size)
+    beside = bench.trials([trial.model.at(here + step) for step in steps])
+    return trial, slopes_of(trial, beside, np.diag(steps))
 
 
 def judged(yard: Yardstick, trial: Trial, slopes: Array) -> Fitted:

@@ -62,10 +62,11 @@ class _Search:
     settings: Settings
     tell: Callable[[str], None]
     heldout_of: Callable[[Trial], Context] | None
+    begun: int  # simulations of the bench before it
 
     def spent(self) -> bool:
         """Whether the search has cost what it may."""
-        return self.bench.simulations >= self.settings.most_simulations
+        return self.bench.simulations - self.begun >= self.settings.most_simulations
 
 
 def select(
@@ -99,7 +100,7 @@ def select(
     heldout_of : callable, optional
         As `context_of`, of the records held out: what is found again in them is proven.
     """
-    search = _Search(bench, causes, context_of, settings, tell, heldout_of)
+    search = _Search(bench, causes, context_of, settings, tell, heldout_of, bench.simulations)
     current = tuned
     rounds: list[Round] = []
     choices: list[Choice] = []

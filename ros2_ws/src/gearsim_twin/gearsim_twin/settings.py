@@ -21,8 +21,8 @@ class Settings:
     most_guesses : int
         First guesses that are simulated in the first round; half as many in later ones.
     most_simulations : int
-        Simulations of a record that a search may cost; what is not tried for that is told. Counted, not
-        timed, so that a verdict does not depend on how busy the computer is.
+        Simulations of a record that a search may cost, the tuning before it not counted; what is not tried
+        for that is told. Counted, not timed, so that a verdict does not depend on how busy the computer is.
     most_refining : int
         Simulations of a record for the last fit of the chosen model.
     most_channels : int
@@ -56,7 +56,7 @@ class Settings:
     most_causes: int = 3
     fits: int = 4
     most_guesses: int = 32
-    most_simulations: int = 160
+    most_simulations: int = 140
     most_refining: int = 60
     most_channels: int = 3
     most_records: int = 3
