@@ -67,7 +67,8 @@ class Explanations:
     criterion : float
         m log(errors) + (q + 1) log m of the best one; the less, the likelier is a path of that length, as the
         difference of two is twice that of their log evidence (Schwarz, Ann. Statist. 6 (1978) 461-464). m:
-        errors that are independent, of those that p leaves free one in `votes.DISPERSION`.
+        errors that are independent, of those that p leaves free one in `votes.DISPERSION`; infinite where
+        they are one or none.
     """
 
     entry: NDArray[np.float64]
@@ -132,6 +133,8 @@ class PathFit:
     def criterion(self, error: float) -> float:
         """What `Explanations.criterion` is, for a sum of squared errors."""
         independent = (self.residual.size - self.order) / DISPERSION
+        if independent <= 1.0:
+            return math.inf  # too short an impact tells nothing of its path
         return independent * math.log(max(error, 1e-300)) + self.length * math.log(independent)
 
     def error(self, drive: NDArray[np.float64], first: int) -> float:

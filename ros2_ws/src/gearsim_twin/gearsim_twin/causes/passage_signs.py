@@ -17,7 +17,7 @@ import numpy as np
 from gearsim_dsp.bands import TOP_SHARE
 from gearsim_dsp.judges.finding import Finding
 from gearsim_dsp.kinematics import FaultFamily, fault_families
-from gearsim_twin.causes.bearing_signs import Sign
+from gearsim_twin.causes.bearing_signs import Sign, signs_of
 from gearsim_twin.causes.cause import REPEATED_NATS
 from gearsim_twin.compare.passages import (
     ANGLE_MARKS,
@@ -41,6 +41,7 @@ _AS_STRONG, _LACKING = 0.5, 0.1
 _SAME_ORDER = 1e-3
 _NEAR = 2e-3  # where a fundamental is known, in parts of it
 _RIVAL_SHARE = 0.25
+_ELEMENT = "rolling_element"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +68,23 @@ def passage_signs(context: Context, fault: str, *, absent: bool = False) -> list
     `absent` asks for what the model has not at all, without the noise that hides it.
     """
     found: list[tuple[int, Sign]] = []
+    # An element that strikes both races, at all angles to the load, has lines wherever a race has.
+    struck = _with_damaged_elements(context) if fault != _ELEMENT else set()
     for run in _runs(context):
         if run.family.fault != fault:
             continue
         each = [_shown(view, run, run.order) for view in context.views]
         most = int(np.argmax([one.power for one in each]))
         if each[most].power > 0 and _lacks(context, run, each, absent=absent):
-            found += [(most, sign) for sign in _signs(context.views[most], run)]
+            signs = _signs(context.views[most], run)
+            found += [(most, sign) for sign in signs if sign.component not in struck]
     return sorted(found, key=lambda each: -each[1].weight)
+
+
+def _with_damaged_elements(context: Context) -> set[str]:
+    """Bearings whose envelopes show a damaged element."""
+    signs = [sign for view in context.views for sign in signs_of(view)]
+    return {sign.component for sign in signs if sign.fault == _ELEMENT and sign.is_fault}
 
 
 def shown_again(sign: Sign, heldout: Context) -> bool:
