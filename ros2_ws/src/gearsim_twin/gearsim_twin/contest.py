@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearsim_twin.causes.cause import Parameter
-from gearsim_twin.fit import Fitted, held, judged, slopes_of
+from gearsim_twin.fit import Fitted, coordinates_of, fine_step, held, judged, slopes_of, value_of
 from gearsim_twin.likelihood import Posterior, Yardstick
 from gearsim_twin.model import Model
 from gearsim_twin.stack import Array
@@ -27,7 +26,6 @@ _STEPS = 3
 _PARTS = (1.0, 0.35)
 # A step shorter than this part of the posterior's standard deviation changes nothing that could be seen.
 _SHORT = 0.25
-_PLAIN_STEP = 0.25
 # So far behind the best, in nats, a cause is not followed after so many steps.
 _BEHIND = (80.0, 40.0, 20.0)
 # How far off, and in how many parameters, a start is looked for.
@@ -52,7 +50,7 @@ class _Runner:
     @property
     def at(self) -> Array:
         """Its coordinates and those of everything else."""
-        return np.array(self.trial.model.coordinates, dtype=np.float64)
+        return coordinates_of(self.trial)
 
     def slopes(self, known: Array) -> Array:
         """Slopes of all coordinates: its own between those of the causes before it and those of the knobs."""
@@ -78,10 +76,7 @@ def contest(
     enough : callable
         True once no further simulation may be asked for.
     """
-    runners = [
-        _Runner(first, yard.value(first.levels, _at(first)), np.zeros((yard.stack.size, 0)))
-        for first in firsts
-    ]
+    runners = [_Runner(first, value_of(yard, first), np.zeros((yard.stack.size, 0))) for first in firsts]
     _look_around(bench, yard, runners)
     for turn in range(_STEPS):
         best = max(runner.value for runner in runners)
@@ -98,10 +93,6 @@ def contest(
     if not enough():
         _take_slopes(bench, near)
     return [judged(yard, runner.trial, runner.slopes(known_slopes)) for runner in runners]
-
-
-def _at(trial: Trial) -> Array:
-    return np.array(trial.model.coordinates, dtype=np.float64)
 
 
 def _own(trial: Trial) -> Array:
@@ -127,7 +118,7 @@ def _look_around(bench: Workbench, yard: Yardstick, runners: list[_Runner]) -> N
         runner.own = np.stack(columns, axis=1) if columns else np.zeros((yard.stack.size, 0))
         runner.rough = bool(columns)
         for _, trial in runner.beside:
-            value = yard.value(trial.levels, _at(trial))
+            value = value_of(yard, trial)
             if value > runner.value:
                 runner.trial, runner.value = trial, value
 
@@ -159,7 +150,7 @@ def _step(bench: Workbench, yard: Yardstick, runners: list[_Runner], known: Arra
         found.setdefault(id(runner), []).append(trial)
     for runner in runners:
         own = found.get(id(runner), [])
-        values = [yard.value(trial.levels, _at(trial)) for trial in own]
+        values = [value_of(yard, trial) for trial in own]
         k = int(np.argmax(values)) if values else -1
         if k < 0 or values[k] <= runner.value:
             # Rough slopes may mislead: they are taken anew once before that is the end.
@@ -180,7 +171,7 @@ def _worthwhile(posterior: Posterior, at: Array) -> Array | None:
 def _take_slopes(bench: Workbench, runners: list[_Runner]) -> None:
     """Slopes of each one's own coordinates, by a simulation for each; backwards where that is refused."""
     wanted = [
-        (runner, k, _fine_step(parameter, float(runner.trial.model.extensions[-1].values[parameter.name]), u))
+        (runner, k, fine_step(parameter, float(runner.trial.model.extensions[-1].values[parameter.name]), u))
         for runner in runners
         for k, (parameter, u) in enumerate(
             zip(runner.trial.model.extensions[-1].free, _own(runner.trial).tolist(), strict=True)
@@ -209,12 +200,3 @@ def _beside(model: Model, number: int, step: float) -> Model:
     moved = np.array(last.coordinates, dtype=np.float64)
     moved[number] += step
     return model.with_last(last.at(tuple(moved)))
-
-
-def _fine_step(parameter: Parameter, value: float, coordinate: float) -> float:
-    """Step of a difference in the coordinate, away from the nearer bound."""
-    if not parameter.step:
-        return -_PLAIN_STEP if coordinate > 0 else _PLAIN_STEP
-    up = parameter.prior.coordinate(value + parameter.step) - coordinate
-    down = parameter.prior.coordinate(value - parameter.step) - coordinate
-    return up if abs(up) >= abs(down) else down

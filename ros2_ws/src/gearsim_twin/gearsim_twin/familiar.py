@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsim_twin.compare.features import Features
-from gearsim_twin.compare.levels import Levels
+from gearsim_twin.compare.levels import Levels, difference_db
 from gearsim_twin.compare.places import Place
 from gearsim_twin.stack import Array
 
@@ -86,13 +86,13 @@ class Familiar:
         h = self.healthy.levels
         rows = _Rows.of(self.healthy.places, h)
         level, scatter = rows.sum(h, bare.levels, added.levels, superposed)
-        scaled = np.clip(_difference(whole.levels, added.levels), -_MOST_DB, _MOST_DB)
+        scaled = np.clip(difference_db(whole.level_db, added.level_db), -_MOST_DB, _MOST_DB)
         known = np.isfinite(h.level_db) & np.isfinite(h.std_db) & np.isfinite(level)
         # What only the model with the cause has is the cause's.
         known &= np.isfinite(whole.level_db) | ~np.isfinite(bare.level_db)
         known &= np.isfinite(bare.level_db) | ~np.isfinite(whole.level_db)
         level = level + scaled
-        change = np.abs(_difference_of(level - scaled, h.level_db)) * rows.scale
+        change = np.abs(difference_db(level - scaled, h.level_db)) * rows.scale
         kept = 10 ** (-0.1 * (change + np.abs(scaled) * rows.scale))
         own = np.where(rows.of_impacts, np.minimum((change / _IMPACT_DB), 1.0), 1.0 - kept)
         w = plain.levels
@@ -144,7 +144,7 @@ class _Rows:
 
     def sum(self, h: Levels, bare: Levels, added: Levels, superposed: bool) -> tuple[Array, Array]:
         """Levels with what a cause adds, and how much the unknown angle of lines scatters them, dB."""
-        change = np.clip(_difference(added, bare), -_MOST_DB, _MOST_DB)
+        change = np.clip(difference_db(added.level_db, bare.level_db), -_MOST_DB, _MOST_DB)
         level = h.level_db + change  # what takes away, and what no sum is known of
         scatter = np.zeros(level.size)
         p, q = _power(h.level_db), _power(bare.level_db)
@@ -225,13 +225,3 @@ def _squared(difference: Array, model: Array) -> Array:
 
 def _power(level_db: Array) -> Array:
     return np.asarray(10.0 ** (0.1 * level_db))
-
-
-def _difference_of(one: Array, other: Array) -> Array:
-    both = np.isfinite(one) & np.isfinite(other)
-    return np.where(both, one, 0.0) - np.where(both, other, 0.0)
-
-
-def _difference(one: Levels, other: Levels) -> Array:
-    """Of levels, dB; 0 where one of them is silent."""
-    return _difference_of(one.level_db, other.level_db)

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearsim_twin.causes.cause import Parameter
 from gearsim_twin.likelihood import Posterior, Yardstick
 from gearsim_twin.model import Model
 from gearsim_twin.stack import Array
 from gearsim_twin.workbench import Trial, Workbench
 
-__all__ = ["Fitted", "fit_tuning", "held", "judged", "slopes_of"]
+__all__ = ["Fitted", "coordinates_of", "fine_step", "fit_tuning", "held", "judged", "slopes_of", "value_of"]
 
 _STEPS = 6
 # Lengths of a step that are tried at one go; shorter ones change nothing, lesser gains are not worth a step.
@@ -27,7 +28,7 @@ _LOOKS, _HIGHER = (-1.5, -0.75, 0.75, 1.5), 1.0
 _POOR, _SMOOTH_DB = 1.5, 1.0
 # Longest step, in standard deviations of the prior: beyond, levels are no longer linear in the parameters.
 _LONGEST = 1.5
-_TUNING_STEP = 0.5
+_TUNING_STEP, _PLAIN_STEP = 0.5, 0.25
 # Levels that change by more from one simulation to its neighbour (notches, lines that sink into noise) do not
 # change in proportion.
 _LINEAR_DB = 3.0
@@ -56,7 +57,26 @@ class Fitted:
     @property
     def at(self) -> Array:
         """Coordinates of the trial."""
-        return np.array(self.trial.model.coordinates, dtype=np.float64)
+        return coordinates_of(self.trial)
+
+
+def coordinates_of(trial: Trial) -> Array:
+    """Coordinates of a trial's causes, then those of its tuning, shape (p,)."""
+    return np.array(trial.model.coordinates, dtype=np.float64)
+
+
+def value_of(yard: Yardstick, trial: Trial) -> float:
+    """Log likelihood of a trial plus the log priors of its coordinates, in nats."""
+    return yard.value(trial.levels, coordinates_of(trial))
+
+
+def fine_step(parameter: Parameter, value: float, coordinate: float) -> float:
+    """Step of a difference in the coordinate, away from the nearer bound."""
+    if not parameter.step:
+        return -_PLAIN_STEP if coordinate > 0 else _PLAIN_STEP
+    up = parameter.prior.coordinate(value + parameter.step) - coordinate
+    down = parameter.prior.coordinate(value - parameter.step) - coordinate
+    return up if abs(up) >= abs(down) else down
 
 
 def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
@@ -71,8 +91,8 @@ def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
         # Likelihoods of resonances have several hills: a model that tells little is on a low one.
         here = np.array(best.model.knobs)
         looks = [here + far * row for row in np.eye(here.size) for far in _LOOKS]
-        other = max(bench.trials([model.at(at) for at in looks]), key=lambda trial: _value(yard, trial))
-        if _value(yard, other) > _value(yard, best) + _HIGHER:
+        other = max(bench.trials([model.at(at) for at in looks]), key=lambda trial: value_of(yard, trial))
+        if value_of(yard, other) > value_of(yard, best) + _HIGHER:
             best, slopes = _climbed(bench, yard, other)
     return judged(yard, best, slopes)
 
@@ -80,14 +100,14 @@ def fit_tuning(bench: Workbench, yard: Yardstick, model: Model) -> Fitted:
 def _climbed(bench: Workbench, yard: Yardstick, first: Trial) -> tuple[Trial, Array]:
     """The best trial that steps from the first one lead to, with the slopes of the knobs."""
     best, slopes = _with_slopes(bench, first)
-    value, taken_at = _value(yard, best), np.array(best.model.knobs)
+    value, taken_at = value_of(yard, best), np.array(best.model.knobs)
     for _ in range(_STEPS):
         here = np.array(best.model.knobs)
         step = held(yard.posterior(best.levels, slopes, here).coordinates - here)
         if not step.size or float(np.max(np.abs(step))) < _SHORT:
             break
         trials = bench.trials([best.model.at(here + part * step) for part in _PARTS])
-        values = [_value(yard, trial) for trial in trials]
+        values = [value_of(yard, trial) for trial in trials]
         k = int(np.argmax(values))
         if values[k] > value + _WORTH:
             best, value = trials[k], values[k]
@@ -99,10 +119,6 @@ def _climbed(bench: Workbench, yard: Yardstick, first: Trial) -> tuple[Trial, Ar
     if _far(np.array(best.model.knobs), taken_at):
         best, slopes = _with_slopes(bench, best)
     return best, slopes
-
-
-def _value(yard: Yardstick, trial: Trial) -> float:
-    return yard.value(trial.levels, np.array(trial.model.knobs, dtype=np.float64))
 
 
 def _poor(yard: Yardstick, trial: Trial) -> bool:
@@ -129,7 +145,7 @@ def _with_slopes(bench: Workbench, trial: Trial) -> tuple[Trial, Array]:
 
 def judged(yard: Yardstick, trial: Trial, slopes: Array) -> Fitted:
     """A trial by a yardstick, with the slopes of its coordinates."""
-    here = np.array(trial.model.coordinates, dtype=np.float64)
+    here = coordinates_of(trial)
     posterior = yard.posterior(trial.levels, slopes, here)
     value = yard.value(trial.levels, here) - trial.model.reading_nats
     return Fitted(trial, slopes, posterior, value + posterior.volume)

@@ -6,7 +6,6 @@ first, if there are any) -> causes chosen one by one -> scores on held-out recor
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,7 +40,7 @@ from gearsim_twin.select import select
 from gearsim_twin.settings import Settings
 from gearsim_twin.simulated import Simulator
 from gearsim_twin.stated_floor import without_floor
-from gearsim_twin.taught import Taught
+from gearsim_twin.taught import NEAR, Conditions, Taught, apart
 from gearsim_twin.tuning import Tuning, tuning_of
 from gearsim_twin.verdict import Verdict
 from gearsim_twin.view import View
@@ -51,8 +50,6 @@ from gearsim_twin.workbench import Job, Trial, Workbench
 __all__ = ["Bench", "judge"]
 
 Tell = Callable[[str], None]
-# Records whose speed, load and force differ by less tell a search the same.
-_ANOTHER = 0.1
 # Periods of the slowest part that a simulation holds at least.
 _LEAST_PERIODS = 8.0
 
@@ -129,7 +126,7 @@ class Bench:
             chance=self.chance(numbers, training, plan),
             numbers=numbers,
             taught=taught,
-            conditions=tuple((self.views[k].speed_hz, *_conditions(self.nominal[k])) for k in numbers),
+            conditions=tuple(self._conditions(k) for k in numbers),
         )
 
     @property
@@ -152,7 +149,7 @@ class Bench:
         seeds = range(self.settings.seed, self.settings.seed + number)
         learnt: list[int] = []
         for own in numbers[:training]:
-            if all(self._apart(own, other) >= _ANOTHER for other in learnt):
+            if all(self._apart(own, other) >= NEAR for other in learnt):
                 learnt.append(own)
         jobs = [(own, self.nominal[own], seed) for own in learnt for seed in seeds]
         found = self.simulator.seeded(jobs, partial(features, plan=plan), self.seconds)
@@ -166,18 +163,19 @@ class Bench:
         training = range(len(self.case.training))
         kept = [0]
         while len(kept) < min(self.settings.most_records, len(training)):
-            apart = {k: min(self._apart(k, other) for other in kept) for k in training if k not in kept}
-            furthest = max(apart, key=lambda k: apart[k])
-            if apart[furthest] < _ANOTHER:
+            far = {k: min(self._apart(k, other) for other in kept) for k in training if k not in kept}
+            furthest = max(far, key=lambda k: far[k])
+            if far[furthest] < NEAR:
                 break
             kept.append(furthest)
         return tuple(sorted(kept))
 
+    def _conditions(self, record: int) -> Conditions:
+        """Speed, load, and radial force of a record."""
+        return (self.views[record].speed_hz, *_load_and_force(self.nominal[record]))
+
     def _apart(self, one: int, other: int) -> float:
-        """How different the conditions of two records are: speed, load and force by their ratios."""
-        both = ((self.views[k].speed_hz, *_conditions(self.nominal[k])) for k in (one, other))
-        pairs = zip(*both, strict=True)
-        return sum(abs(math.log(max(a, 1e-9) / max(b, 1e-9))) for a, b in pairs)
+        return apart(self._conditions(one), self._conditions(other))
 
     def heldout(self, bench: Workbench, prior: Prior, trial: Trial) -> Context:
         """What the finders of causes may look at when they are asked a second time."""
@@ -339,7 +337,7 @@ def _prior(bench: Bench, tuning: Tuning, tell: Tell) -> Prior:
     return calibrated(bench.workbench(bench.healthy, len(bench.healthy), bench.search), prior)
 
 
-def _conditions(content: Content) -> tuple[float, float]:
+def _load_and_force(content: Content) -> tuple[float, float]:
     """Load and radial force under which a model runs."""
     point = content.get("operating_point", {})
     force = content.get("parameters", {}).get("radial_load", {})

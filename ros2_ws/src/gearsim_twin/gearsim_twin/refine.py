@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsim_twin.causes.cause import Parameter
-from gearsim_twin.fit import Fitted, held, judged
+from gearsim_twin.fit import Fitted, coordinates_of, fine_step, held, judged, value_of
 from gearsim_twin.likelihood import Yardstick
 from gearsim_twin.model import Model
 from gearsim_twin.stack import Array
@@ -31,7 +30,7 @@ _REACH, _RIDGE = 0.5, 1e-3
 _STEEPEST_DB, _FAR = 6.0, 0.3
 # Slopes are not wrong by more than this factor.
 _WIDEST = 5.0
-_KNOB_STEP, _PLAIN_STEP = 0.5, 0.25
+_KNOB_STEP = 0.5
 # Steps shorter than this part of the posterior's standard deviation change nothing that could be seen.
 _SHORT = 0.25
 # Nats for which a step is worth its simulations.
@@ -83,11 +82,11 @@ def _as_it_falls(yard: Yardstick, fitted: Fitted, seen: Sequence[Trial]) -> Fitt
         top = yard.posterior(fitted.trial.levels, slopes, here).value
         far, falls = [], []
         for trial in seen:
-            moved = np.abs(_at(trial) - here)
+            moved = np.abs(coordinates_of(trial) - here)
             if trial.refused or not moved[k] > 0.0 or np.any(np.delete(moved, k) > 1e-9):
                 continue
             far.append(float(moved[k]))
-            falls.append(top - yard.posterior(trial.levels, slopes, _at(trial)).value)
+            falls.append(top - yard.posterior(trial.levels, slopes, coordinates_of(trial)).value)
         h2 = np.array(far) ** 2
         total = max(2.0 * float(np.sum(h2 * np.array(falls))), 1e-12)
         if far:
@@ -98,14 +97,14 @@ def _as_it_falls(yard: Yardstick, fitted: Fitted, seen: Sequence[Trial]) -> Fitt
 
 def _better(bench: Workbench, yard: Yardstick, base: Fitted) -> tuple[Trial | None, list[Trial]]:
     """A trial that does better, if one is found, and all that were simulated for it."""
-    least = _value(yard, base.trial) + _WORTH
+    least = value_of(yard, base.trial) + _WORTH
     looked = bench.trials([base.trial.model.at(at) for at in _near(base)])
     found = _best(yard, looked)
-    if found is None or _value(yard, found) < least:
+    if found is None or value_of(yard, found) < least:
         moved = bench.trials(_adapted(yard, base, looked))
         looked += moved
         found = _best(yard, moved)
-    return (found if found is not None and _value(yard, found) >= least else None), looked
+    return (found if found is not None and value_of(yard, found) >= least else None), looked
 
 
 def slopes_among(trial: Trial, seen: Sequence[Trial]) -> Array:
@@ -115,9 +114,9 @@ def slopes_among(trial: Trial, seen: Sequence[Trial]) -> Array:
     chance, and taken for a slope it would be information on the parameter that nobody has: each slope is
     shrunk by what the scatter about the plane makes of it.
     """
-    here = _at(trial)
+    here = coordinates_of(trial)
     others = [each for each in seen if not each.refused and each is not trial]
-    x = np.array([_at(each) - here for each in others]).reshape(len(others), here.size)
+    x = np.array([coordinates_of(each) - here for each in others]).reshape(len(others), here.size)
     weight = np.exp(-0.5 * np.sum(x**2, axis=1) / _REACH**2)
     change = np.array([np.nan_to_num(each.levels.level_db - trial.levels.level_db) for each in others])
     change = np.clip(change, -_STEEPEST_DB, _STEEPEST_DB).reshape(len(others), -1)
@@ -132,7 +131,7 @@ def slopes_among(trial: Trial, seen: Sequence[Trial]) -> Array:
 
 
 def _far(one: Trial, other: Trial) -> bool:
-    return float(np.max(np.abs(_at(one) - _at(other)))) > _FAR
+    return float(np.max(np.abs(coordinates_of(one) - coordinates_of(other)))) > _FAR
 
 
 def _near(fitted: Fitted) -> list[Array]:
@@ -152,7 +151,7 @@ def _near(fitted: Fitted) -> list[Array]:
 
 def _best(yard: Yardstick, trials: Sequence[Trial]) -> Trial | None:
     able = [each for each in trials if not each.refused]
-    return max(able, key=lambda each: _value(yard, each), default=None)
+    return max(able, key=lambda each: value_of(yard, each), default=None)
 
 
 def _adapted(yard: Yardstick, base: Fitted, near: Sequence[Trial]) -> list[Model]:
@@ -162,11 +161,16 @@ def _adapted(yard: Yardstick, base: Fitted, near: Sequence[Trial]) -> list[Model
         if trial.refused:
             continue
         slopes = base.slopes.copy()
-        slopes[:, np.abs(_at(trial) - base.at) > 0.0] = 0.0
+        slopes[:, np.abs(coordinates_of(trial) - base.at) > 0.0] = 0.0
         if np.all(slopes == 0.0):
             slopes[:, _causes(base) :] = base.slopes[:, _causes(base) :]
-        posterior = yard.posterior(trial.levels, slopes, _at(trial))
-        found.append((posterior.value, trial.model.at(_at(trial) + held(posterior.coordinates - _at(trial)))))
+        posterior = yard.posterior(trial.levels, slopes, coordinates_of(trial))
+        found.append(
+            (
+                posterior.value,
+                trial.model.at(coordinates_of(trial) + held(posterior.coordinates - coordinates_of(trial))),
+            )
+        )
     found.sort(key=lambda each: -each[0])
     return [model for _, model in found[:_ADAPTED]]
 
@@ -176,17 +180,9 @@ def _causes(fitted: Fitted) -> int:
     return fitted.at.size - len(fitted.trial.model.knobs)
 
 
-def _value(yard: Yardstick, trial: Trial) -> float:
-    return yard.value(trial.levels, _at(trial))
-
-
-def _at(trial: Trial) -> Array:
-    return np.array(trial.model.coordinates, dtype=np.float64)
-
-
 def _around(bench: Workbench, trial: Trial) -> list[Trial]:
     """A simulation beside it for each coordinate; on the other side where that is refused."""
-    here = _at(trial)
+    here = coordinates_of(trial)
     steps = np.array([_step(trial.model, k, float(u)) for k, u in enumerate(here.tolist())])
     beside = bench.trials([_beside(trial.model, here, k, step) for k, step in enumerate(steps.tolist())])
     refused = [k for k, each in enumerate(beside) if each.refused]
@@ -206,14 +202,5 @@ def _step(model: Model, number: int, coordinate: float) -> float:
     for extension, own in zip(model.extensions, model.own, strict=True):
         if own.start <= number < own.stop:
             parameter = extension.free[number - own.start]
-            return _own_step(parameter, float(extension.values[parameter.name]), coordinate)
+            return fine_step(parameter, float(extension.values[parameter.name]), coordinate)
     return -_KNOB_STEP if coordinate > 0 else _KNOB_STEP
-
-
-def _own_step(parameter: Parameter, value: float, coordinate: float) -> float:
-    """Away from the nearer bound."""
-    if not parameter.step:
-        return -_PLAIN_STEP if coordinate > 0 else _PLAIN_STEP
-    up = parameter.prior.coordinate(value + parameter.step) - coordinate
-    down = parameter.prior.coordinate(value - parameter.step) - coordinate
-    return up if abs(up) >= abs(down) else down

@@ -16,10 +16,11 @@ import numpy as np
 
 from gearsim_twin.compare.discrepancy import RATIO_DB
 from gearsim_twin.compare.features import Features
+from gearsim_twin.compare.levels import difference_db
 from gearsim_twin.familiar import Familiar
 from gearsim_twin.stack import Array, group_of
 
-__all__ = ["NEAR", "REPEAT_DB", "Conditions", "Taught"]
+__all__ = ["NEAR", "REPEAT_DB", "Conditions", "Taught", "apart"]
 
 Conditions = tuple[float, float, float]
 """Speed, load, and radial force."""
@@ -90,7 +91,7 @@ class Taught:
         near = self.near(here)
         if not near:
             return None
-        shifts = np.stack([_shift(bare, self.model[k]) for k in near])
+        shifts = np.stack([difference_db(bare.level_db, self.model[k].level_db) for k in near])
         distance = np.array([apart(self.conditions[k], here) for k in near])[:, None] / NEAR
         domain = [group_of(place) for place in bare.places]
         # Distances of lines from their places are no decibels.
@@ -152,18 +153,12 @@ def apart(one: Conditions, other: Conditions) -> float:
     return float(np.sum(np.abs(logs)))
 
 
-def _shift(here: Features, there: Features) -> Array:
-    """What the model says that other conditions do, dB; 0 where it says nothing."""
-    both = np.isfinite(here.level_db) & np.isfinite(there.level_db)
-    return np.where(both, np.where(both, here.level_db, 0.0) - np.where(both, there.level_db, 0.0), 0.0)
-
-
 def _between(taught: Taught, j: int, k: int) -> tuple[Array, Array]:
     """Difference of two healthy records beyond what conditions do, and the variance of its sampling."""
     one, other = taught.measured[j], taught.measured[k]
     told = np.isfinite(one.level_db) & np.isfinite(other.level_db) & (one.stands_out | other.stands_out)
     difference = np.where(told, one.level_db, 0.0) - np.where(told, other.level_db, 0.0)
-    difference -= _shift(taught.model[j], taught.model[k])
+    difference -= difference_db(taught.model[j].level_db, taught.model[k].level_db)
     # Held as outliers are: one place that is none of the machine's must not teach the rest.
     sampling2 = np.where(told, one.std_db, 1.0) ** 2 + np.where(told, other.std_db, 1.0) ** 2
     most = 3.0 * np.sqrt(sampling2 + 2.0 * max(REPEAT_DB.values()) ** 2)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearsim_io.errors import InputError
 
-__all__ = ["Levels", "joined", "nothing"]
+__all__ = ["Levels", "difference_db", "joined", "nothing"]
 
 Vector = NDArray[np.float64]
 
@@ -99,3 +99,9 @@ def nothing(count: int) -> Levels:
 def joined(parts: Sequence[Levels]) -> Levels:
     """Levels one after the other."""
     return Levels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Levels)))
+
+
+def difference_db(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Differences of levels, dB, shape (n,); 0 where one of the two is silent."""
+    both = np.isfinite(one) & np.isfinite(other)
+    return np.where(both, one, 0.0) - np.where(both, other, 0.0)
